@@ -20,7 +20,17 @@ GAIN = 0.02
 """part of the drift that each sample shows"""
 SHIFTS = {"dead": 1.0, "delay": 0.01, "friction": 0.02, "lever": 0.05}
 """numbers of a machine to which a step of 1 adds this, in their units"""
-FACTORS = ("exponent", "full", "lag", "load", "stiff", "ratio", "draw", "droop")
+FACTORS = (
+    "exponent",
+    "full",
+    "lag",
+    "load",
+    "stiff",
+    "ratio",
+    "draw",
+    "droop",
+    "rises",
+)
 """numbers of a machine that a step of 1 multiplies by exp(0.1)"""
 LIMITS = {"dead": (0.0, 90.0), "friction": (0.0, 0.9), "lever": (-0.9, 0.9)}
 """A delay has none: below 0, a command acts before the sample that first shows it."""
@@ -97,11 +107,16 @@ def numbers(m: Machine) -> list[Place]:
 
 def is_there(m: Machine, name: str, place: tuple[int, ...]) -> bool:
     """Whether a number of a machine acts: no lever of a rotary actuator, no load of an
-    upright axis."""
+    upright axis.
+
+    Where a valve has a bent curve, that of every valve is sought.
+    """
     if name == "draw":
         return m.droop > 0
     if name == "load":
         return not m.vertical[place]
+    if name == "rises":
+        return m.is_bent
     of = {"ratio": "stiff"}.get(name, name)
     return (
         name not in ("lever", "stiff", "ratio", "droop")
@@ -112,15 +127,16 @@ def is_there(m: Machine, name: str, place: tuple[int, ...]) -> bool:
 def moved(truth: Machine, places: Sequence[Place], steps: Array) -> Machine:
     """Return a machine whose numbers at P places are P steps, (P,), from the true
     ones."""
-    machine = copy(truth)
-    for name in (*SHIFTS, *FACTORS):
-        setattr(machine, name, np.array(getattr(truth, name), float))
+    names = (*SHIFTS, *FACTORS)
+    values = {name: np.array(getattr(truth, name), float) for name in names}
     for (name, place), step in zip(places, steps, strict=True):
-        values = getattr(machine, name)
         if name in SHIFTS:
-            values[place] += SHIFTS[name] * step
+            values[name][place] += SHIFTS[name] * step
         else:
-            values[place] *= np.exp(0.1 * step)
+            values[name][place] *= np.exp(0.1 * step)
+    machine = copy(truth)
+    for name in names:
+        setattr(machine, name, values[name])
     machine.droop = float(machine.droop)
     return machine
 

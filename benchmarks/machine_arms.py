@@ -10,7 +10,7 @@ lengths of its cylinders over the joints' ranges are the truth's. It is said if 
 what they should be where the file does not tell, and a line says so. With --follow
 those that are taken so go through the commands that `init` prints: check, a fit of that
 budget, and validation on a second log; an arm is right then if the fit errs there by at
-most a third of what standing still does (shown in brackets) [deg]. Their logs are of
+most a third of what standing still does (shown in brackets) [deg, mm]. Their logs are of
 valves of their own equations, on which no load acts: they show that the way is open,
 not how well loads are predicted. With another version of hydroid on PYTHONPATH the
 table is that of this version.

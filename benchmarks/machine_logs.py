@@ -9,8 +9,9 @@ they are read by what `hydroid init` writes. With it, the commands that `init` p
 are followed: check, a fit of that budget of CPU time, and validation on a second log;
 and then for twelve arms (tests/helpers/worlds.py), whose fits have three times as much. A log is
 right if it is read rightly, if the fit errs on the second log by at most a third of
-what standing still does (shown in brackets) [deg], and if its speeds from 60 % of
-command are those that made the log, within 10 % of the largest, in the same direction.
+what standing still does (shown in brackets) [deg, mm], and if its speeds from 60 % of
+the strongest command are those that made the log, within 10 % of the largest, in the
+same direction.
 Many logs hold the same once they are read: what holds the same is fitted once. With
 another version of hydroid on PYTHONPATH the table is that of this version.
 """

@@ -132,6 +132,25 @@ class Machine:
             self.line = int(rng.choice([SATURATES, OPEN_CENTRE]))
 
     @property
+    def is_bent(self) -> bool:
+        """Whether the curve of any valve is not its power law."""
+        return bool((self.curve != KNOTS).any())
+
+    @property
+    def rises(self) -> Array:
+        """By how much each valve's curve rises between KNOTS, (J, 2, 4); where it is
+        set, only their proportions count."""
+        return np.diff(self.curve, axis=2)
+
+    @rises.setter
+    def rises(self, rises: Array) -> None:
+        if not self.is_bent:
+            return
+        self.curve = np.zeros_like(self.curve)
+        self.curve[:, :, 1:] = np.cumsum(rises, axis=2)
+        self.curve /= self.curve[:, :, -1:]
+
+    @property
     def terms(self) -> Any:
         """Whether a shared pump, oil, and each joint's lag before its dead band show,
         (2 + J,)."""

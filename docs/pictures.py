@@ -31,7 +31,7 @@ SHOTS = {
     "report_motion": ("mech/report.html", ".beside", (1000, 420), "light"),
     "report_speed": (
         "hyd/report.html",
-        "Speed and valve against command",
+        "Valve: dead band, opening, and speed against command",
         (1000, 760),
         "light",
     ),
@@ -43,7 +43,7 @@ SHOTS = {
     ),
     "report_residuals": (
         "hyd/report.html",
-        "Are the residuals white?",
+        "Confidence intervals: are the residuals white?",
         (1000, 0),
         "dark",
     ),

@@ -22,7 +22,7 @@ from hydroid.commands.inputs import (
     refuse_overwriting,
 )
 from hydroid.commands.joint_units import in_joint_units
-from hydroid.commands.logs import check_file, plain_findings, undriven_findings
+from hydroid.commands.logs import check_file, joint_findings, plain_findings
 from hydroid.commands.progress import Progress
 from hydroid.files import Plain
 from hydroid.log import (
@@ -104,7 +104,7 @@ def check(
             parts += file.parts
         progress("looking at the motion", len(files), None)
         motion = [
-            *undriven_findings(parts, settings),
+            *joint_findings(parts, settings),
             *motion_findings(parts, settings.arm),
         ]
         agreements = _compared(parts, settings, progress)

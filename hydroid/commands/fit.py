@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from hydroid.arrays import record
 from hydroid.commands.console import Printed
 from hydroid.commands.inputs import LogSource, LogSources, ModelSource, Source
-from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_undriven
+from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_unfit
 from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
 from hydroid.identified_model import IdentifiedModel
@@ -179,7 +179,7 @@ def fit(
     _refuse_copies(read)
     files = [*dict.fromkeys(log_file(log.source) for log in read)]
     _refuse_wrong_payloads(settings, files)
-    refuse_undriven(read, settings)
+    refuse_unfit(read, settings)
     _refuse_empty_groups(settings, files)
     from hydroid.fitting.fit import fit as run_fit
     from hydroid.problem.problem import Problem

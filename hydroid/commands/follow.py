@@ -58,11 +58,11 @@ def follow(
             the fit's logs. Or the tip's position over time: columns time_s, x_m, y_m and
             z_m, or dx_m, dy_m and dz_m from where the tip starts. The tip is the
             `payload` site of the arm's file; without one, the end of the last link.
-            Joints without a column, or without commands, stand still. They stand where
-            the first log of the fit begins, or in the pose of --set start_pose=NAME.
+            Joints without a column, or without commands, stand still: at the first
+            angles of the fit's first log, or in the pose of --set start_pose=NAME.
         out (LOG.csv): The commands and the angles asked for, in the columns and units
             of the fit's logs; the page has the same name [default:
-            runs/follow/commands.csv; in Python nothing is written].
+            runs/follow/commands.csv; in Python: none].
         payload (0 or more): Mass at the tip [kg].
 
     Raises:

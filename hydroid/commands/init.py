@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from hydroid.commands.console import Result
 from hydroid.commands.inputs import Source, as_list, command, names
+from hydroid.commands.progress import Progress
 from hydroid.errors import SettingsError
 from hydroid.files import Plain, is_file
 
@@ -46,8 +47,8 @@ def init(
         arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a
             template of boxes].
         log (LOG): A log; its columns are guessed. Repeat the option for several logs.
-            Of several, the commands to run next fit all but the last, and validate on
-            the last.
+            The commands to run next then fit all logs but the last, and validate on
+            that one.
         config (YAML): The fit.yaml of an earlier init, whose `log` section you have
             completed. Its columns and its arm stay; all other settings are written
             anew.
@@ -60,8 +61,7 @@ def init(
             file are scaled to it.
         force: Replace the files of an earlier project in the folder.
         tip (LINK): Last link of the arm, if the robot has several branches [default:
-            the end of the branch that the log's joints are on; if none is, the end of
-            the longest branch].
+            the end of the branch with the log's joints, or else of the longest branch].
 
     Raises:
         SettingsError: a file of the project is there already, or no joint has one of
@@ -75,26 +75,28 @@ def init(
     kept_config = None if config is None else _existing(config)
     from hydroid.project.project import go_on, write_project
 
-    if kept_config is not None:
-        if any((robot, joints, lengths, tip, total_mass is not None)):
-            hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
-            raise SettingsError(
-                "names its arm, which stays as it is", kept_config, hint
+    with Progress() as progress:
+        if kept_config is not None:
+            if any((robot, joints, lengths, tip, total_mass is not None)):
+                hint = "leave --arm, --joints, --lengths, --tip and --total-mass out"
+                raise SettingsError(
+                    "names its arm, which stays as it is", kept_config, hint
+                )
+            where = Path(folder) if folder else None
+            project = go_on(where, kept_config, logs, progress, force=force)
+        else:
+            _refuse_two_arms(robot, lengths)
+            project = write_project(
+                _required(folder),
+                robot,
+                logs,
+                names(joints),
+                progress,
+                tip=tip,
+                total_mass=total_mass,
+                force=force,
+                lengths=_numbers(names(lengths)),
             )
-        where = Path(folder) if folder else None
-        project = go_on(where, kept_config, logs, force=force)
-    else:
-        _refuse_two_arms(robot, lengths)
-        project = write_project(
-            _required(folder),
-            robot,
-            logs,
-            names(joints),
-            tip=tip,
-            total_mass=total_mass,
-            force=force,
-            lengths=_numbers(names(lengths)),
-        )
     content: Plain = {"out": str(project.folder), "missing": project.missing or None}
     for key in ("files", "notes", "columns", "unused", "commands"):
         content[key] = [*getattr(project, key)]

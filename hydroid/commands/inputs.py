@@ -40,15 +40,14 @@ SettingChanges = Mapping[str, Any] | Sequence[str] | None
 SHARED = f"""
     logs (LOG): Logs of commands and joint angles. Formats: {FORMATS}.
     log (LOG): A log. Formats: {FORMATS}.
-    fit (RUN|YAML): A fit: the folder of a run or of Plant.save (Python), an
-        estimate.yaml, or a YAML file with values of the parameters.
-    out (DIR): Folder for the tables [default: runs/COMMAND; in Python
-        nothing is written].
+    fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a plant saved in Python,
+        or a YAML file of parameter values.
+    out (DIR): Folder for the tables [default: runs/COMMAND; in Python: none].
     config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine.
         For the shipped arm: the name of a shipped config.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
-    repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The files
-        themselves stay as they are.
+    repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The log
+        files stay as they are.
     seed (0 or more): Seed of the random numbers. The same seed gives exactly the same result.
     dask (local[:N]|ADDRESS): Simulate in N processes of this machine, or on the workers of the Dask
         scheduler at ADDRESS. The result is the same.
@@ -63,8 +62,8 @@ SHARED = f"""
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.
     budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. When it is
-        up, hydroid keeps the best model so far; intervals and report take a little
-        longer. To go on, repeat the command with --resume and more time.
+        up, hydroid keeps the best model so far. Intervals and report take some more
+        time. To go on, repeat the command with --resume.
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 

@@ -2,7 +2,7 @@
 the arms of a pair."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,16 +15,19 @@ from hydroid.commands.progress import Progress
 from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.estimate import read_estimate
 from hydroid.files import Plain, is_file
+from hydroid.findings import Level
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import (
     Log,
     LogFinding,
     Reading,
+    by_level,
     check_parts,
     grouped,
     lacked_by_all,
     log_finding,
     open_table,
+    stands_still,
 )
 from hydroid.progress import LOGGER, NOTE, Progress as WorkProgress, no_progress
 from hydroid.settings.fit import FitSettings
@@ -139,35 +142,59 @@ def check_file(
     return check_parts(path, settings.log, arm.ranges, reading, progress)
 
 
-def undriven_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFinding]:
-    """Return that no log drives some compared joints, once for each log; of stage 2 an
-    error if none is.
+def joint_findings(logs: Sequence[Log], settings: FitSettings) -> list[LogFinding]:
+    """Return what keeps compared joints from being fitted to all these logs together,
+    once for each log."""
+    return [*_undriven(logs, settings), *_standing(logs, settings)]
+
+
+def _undriven(logs: Sequence[Log], settings: FitSettings) -> Iterator[LogFinding]:
+    """Yield that no log drives some compared joints; of stage 2 an error if none is.
 
     Joints of stage 1 may move by themselves.
     """
-    names = settings.arm.joint_names
     driven = np.any([log.driven for log in logs], axis=0)
     idle = [joint for joint in settings.outputs if len(logs) and not driven[joint - 1]]
-    if not idle:
-        return []
     level = "warning"
     kind = "not driven"
     if settings.stage == "hyd" and len(idle) == len(settings.outputs):
         level = "error"
         kind = "nothing to fit"
-    subjects = [names[joint - 1] for joint in idle]
-    return [log_finding(level, kind, log.source, *subjects) for log in logs]
+    if idle:
+        yield from _in_each(logs, level, kind, idle, settings)
 
 
-def refuse_undriven(logs: Sequence[Log], settings: FitSettings) -> None:
+def _standing(logs: Sequence[Log], settings: FitSettings) -> Iterator[LogFinding]:
+    """Yield that some compared joints are driven, and to the last digit stand in every
+    log: no machine holds so still, but a sensor that has failed."""
+    standing = [joint for joint in settings.outputs if stands_still(logs, joint)]
+    if standing:
+        yield from _in_each(logs, "error", "never moves", standing, settings)
+
+
+def _in_each(
+    logs: Sequence[Log],
+    level: Level,
+    kind: str,
+    joints: Sequence[int],
+    settings: FitSettings,
+) -> Iterator[LogFinding]:
+    """Yield a finding about joints (numbers, from 1) for each log."""
+    subjects = [settings.arm.joint_names[joint - 1] for joint in joints]
+    for log in logs:
+        yield log_finding(level, kind, log.source, *subjects)
+
+
+def refuse_unfit(logs: Sequence[Log], settings: FitSettings) -> None:
     """Say which compared joints no log drives.
 
-    Raises LogError: there is no other one, and stage 2 has nothing to fit.
+    Raises LogError: there is no other one, and stage 2 has nothing to fit; or the angle
+    of one that is driven never changes.
     """
-    findings = undriven_findings(logs, settings)
+    findings = joint_findings(logs, settings)
     for level, line in grouped(findings):
         if level == "error":
-            raise findings[0].error()
+            raise by_level(findings)[0].error()
         LOGGER.warning("%s: %s", level, line)
 
 

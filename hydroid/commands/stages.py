@@ -21,7 +21,7 @@ from hydroid.commands.inputs import (
     setting_changes,
 )
 from hydroid.commands.joint_units import in_joint_units
-from hydroid.commands.logs import read_logs, refuse_undriven
+from hydroid.commands.logs import read_logs, refuse_unfit
 from hydroid.commands.progress import FitProgress, Progress
 from hydroid.errors import SettingsError
 from hydroid.estimate import FitSummary
@@ -65,7 +65,7 @@ def fit_mech(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default: runs/fit-mech; in Python nothing is written].
+        out (DIR): Run folder [default: runs/fit-mech; in Python: none].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -119,9 +119,10 @@ def fit_hyd(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is written].
-        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values [default:
-            the masses of the arm's file, unless the settings free them].
+        out (DIR): Run folder [default: runs/fit-hyd; in Python: none].
+        mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values. The
+            masses are fixed at these values [default: the settings free the masses, or
+            the arm's file gives them].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -358,10 +359,9 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to free [default: hydroid tries masses, pump,
-            effects of the groups of logs, and tip_load, one after the other, and keeps
-            those that help].
-        out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
+        free (NAME,NAME): Parameters to free [default: those that help, among masses,
+            pump, tip_load and the effects of days or other groups of logs].
+        out (DIR): Run folder [default: runs/adapt; in Python: none].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.
 
@@ -377,7 +377,7 @@ def adapt(
         )
         if stray:
             raise SettingsError("is none of the logs", f"payloads.{min(stray)}")
-    refuse_undriven(read, model.settings)
+    refuse_unfit(read, model.settings)
     from hydroid.advice.adaptation import adapted, load_findings, steps
     from hydroid.advice.loads import asked_loads, load_finding
     from hydroid.reporting.verdict_table import left_out_table

@@ -71,8 +71,7 @@ def simulate(
         config (YAML): Settings; not needed if --fit is a run folder, which has its own.
         commands (COMMANDS.csv): A log of commands. Its angles before the first command
             give the start pose.
-        out (LOG.csv): The log to write [default: runs/simulated.csv; in Python nothing
-            is written].
+        out (LOG.csv): The log to write [default: runs/simulated.csv; in Python: none].
         noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
 
     Raises:
@@ -143,9 +142,9 @@ def view(
         fit (RUN|YAML): An estimate, as a run folder or a YAML file [default: the values
             in the arm's file and under `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
-        collisions: Show nothing. Find instead where parts of the arm touch each other,
-            the base or the floor at the joint angles of the log. With --arm the carrier
-            and the other arm count too. The exit status is 1 if parts touch.
+        collisions: Instead of showing the arm, find where it touches itself, its base or
+            the floor during the log. With --arm the carrier and the other arm count too.
+            The exit status is 1 if anything touches.
         config (YAML): Settings [default: config.yaml in the folder of the estimate,
             or else fit-hyd].
 

@@ -198,11 +198,24 @@ class Ladder:
     ) -> None:
         """Refine on a further rung, if it is better, and then with each of its terms
         besides; those of `lone` are another method's."""
+        if not self._shows(whole.settings, rung):
+            return
         possible = whole.settings.terms(rung)
         terms = tuple(term for term in possible if term in self._step.terms)
         self._rung(whole, Step(rung.name, terms), settings, if_better=True)
         if self._step.model == rung.name:
             self._add_terms(whole, rung, lone, settings)
+
+    def _shows(self, settings: FitSettings, rung: Rung) -> bool:
+        """Whether the logs show anything of what a further rung adds: a term of the
+        last rung that stands for it, as `oil` does for oil and inertia, was kept."""
+        possible = settings.terms(rung)
+        stand_ins = {
+            term
+            for term in settings.terms(self.problem.settings.rung)
+            if term not in possible
+        }
+        return not stand_ins or bool(stand_ins & {*self._step.terms})
 
     def _add_terms(
         self,
@@ -363,20 +376,21 @@ class Ladder:
         the settings' start.
 
         What stood for oil and inertia in the last model, a lag or a dead band, may lie
-        behind a hill. Both are refined a little by output errors: innovations still
-        have the drift of the last model's errors.
+        behind a hill: so the start is tried where the last model leads to larger
+        errors. Both are refined a little by output errors: innovations still have the
+        drift of the last model's errors.
         """
         few = settings.changed({"iterations": FIRST})
-        parameters = likelihood.problem.parameters
-        ends = [
-            self._refined(
-                likelihood.of_output_errors,
-                begun,
-                few,
-                step.changed(phase="at first", start=number),
-            )
-            for number, begun in enumerate((theta, parameters.start))
-        ]
+        problem = likelihood.problem
+        parameters = problem.parameters
+        ends = list[Refinement]()
+        for number, begun in enumerate((theta, parameters.start)):
+            at_first = step.changed(phase="at first", start=number)
+            end = self._refined(likelihood.of_output_errors, begun, few, at_first)
+            ends.append(end)
+            errors = problem.output_errors(parameters.from_unit(end.point[None]))
+            if problem.rms(errors)[0] <= self.kept.rms:
+                break
         return parameters.from_unit(min(ends, key=lambda end: end.negative_log).point)
 
     def _lone_terms(self, settings: FitSettings) -> dict[str, int]:

@@ -15,6 +15,7 @@ from hydroid.log.motion import (
     JointMotion as JointMotion,
     driven_joints as driven_joints,
     motion_of as motion_of,
+    stands_still as stands_still,
 )
 from hydroid.log.motion_checks import motion_findings as motion_findings
 from hydroid.log.read import (

@@ -4,12 +4,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, Ints
 from hydroid.log.clues import CLUES, column_unit
 from hydroid.log.log import LogFinding
 from hydroid.log.repair import FINER, GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
-from hydroid.log.signals import likely_range
+from hydroid.log.signals import (
+    CommandRange,
+    likely_range,
+    of_one_scale,
+    resting_range,
+)
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.log import LogSettings
 from hydroid.units import UNITS, Unit, likely_time_unit
@@ -84,7 +89,7 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
             "period": period,
             "slowest": slowest,
         }
-        remedy = _time_remedy(period, signal.gain)
+        remedy = _time_remedy(recording, period, duration)
         yield recording.finding("error", kind, (), signal, remedy=remedy, **numbers)
         return
     # gaps are spoken of where they split the log
@@ -101,28 +106,43 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
         )
 
 
-def _time_remedy(period: float, factor: float) -> str:
-    """Return what to do about a period [s] that is read with a unit of so many
-    seconds."""
-    unit = likely_time_unit(period / factor)
-    if unit and UNITS[unit].factor != factor:
-        return f"if its unit is {unit}, set log.time.unit: {unit}"
-    return "check log.time.unit and log.period_s"
+def _time_remedy(recording: Recording, period: float, duration: float) -> str:
+    """Return what to do about a period and a duration [s] that no log has.
+
+    Another unit may explain them if the log is then long enough; it is the last thing
+    to think of where the file states the unit.
+    """
+    signal = recording.signals[0]
+    unit = likely_time_unit(period / signal.gain)
+    in_unit = UNITS[unit].factor / signal.gain if unit else 1.0
+    if in_unit == 1 or duration * in_unit < SHORTEST:
+        return "take more samples, or check log.time.unit and log.period_s"
+    hint = f"if its unit is {unit}, set log.time.unit: {unit}"
+    given = recording.table.units.get(signal.name, "")
+    stated = column_unit(signal.name, given)
+    if stated is not None and stated.factor == signal.gain:
+        return f"take more samples, or {hint}"
+    return hint
 
 
 def _values(recording: Recording) -> Iterator[LogFinding]:
     """Yield values outside their limits, which another range, unit or sign may explain
     if they are many."""
+    outside = list[tuple[Signal, Array, Ints]]()
     for signal, values in zip(recording.signals, recording.values.T, strict=True):
         too_low = values < signal.low - 1e-6
         too_high = values > signal.high + 1e-6
         rows = np.flatnonzero(too_low | too_high)
-        if not len(rows):
-            continue
+        if len(rows):
+            outside.append((signal, values, rows))
+    commands = [values for signal, values, _ in outside if signal.kind == "command"]
+    ranges = iter(of_one_scale([*map(likely_range, commands)]))
+    for signal, values, rows in outside:
+        likely = next(ranges) if signal.kind == "command" else None
         kind = "outside"
         remedy = dict[str, str]()
         if len(rows) > MANY * (values != 0).sum():
-            kind, remedy = _explained(signal, values)
+            kind, remedy = _explained(signal, values, likely)
         factor = UNITS[signal.unit].factor
         numbers = {
             "value": values[rows[0]] / factor,
@@ -140,14 +160,19 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
         )
 
 
-def _explained(signal: Signal, values: Array) -> tuple[str, dict[str, str]]:
-    """Return the kind of fault that values outside their limits are, and what mends
-    it."""
-    if signal.kind == "command":
-        likely = likely_range(values)
-        if likely and likely.name != "%":
-            remedy = likely.remedy(signal.setting, signal.gain, signal.offset)
-            return "outside in another range", remedy
+def _explained(
+    signal: Signal, values: Array, likely: CommandRange | None
+) -> tuple[str, dict[str, str]]:
+    """Return the kind of fault that values outside their limits are, and what mends it;
+    commands are `likely` in a range."""
+    if likely and likely.name != "%":
+        at_rest = resting_range(values, likely, None)
+        if at_rest is not None:
+            rest, around = at_rest
+            name = f"{likely.name}, at rest at {rest:.6g}"
+            likely = around.with_overshoot(values)._replace(name=name)
+        remedy = likely.remedy(signal.setting, signal.gain, signal.offset)
+        return "outside in another range", remedy
     if signal.unit == "deg":
         return _explained_angle(signal, values)
     return "outside", {}

@@ -10,7 +10,13 @@ from hydroid.arrays import Array
 from hydroid.files import Plain
 from hydroid.log.columns import Column, Entry
 from hydroid.log.joint_columns import Assignment
-from hydroid.log.signals import CommandRange, likely_range, resting_range
+from hydroid.log.signals import (
+    CommandRange,
+    comes_near_zero,
+    likely_range,
+    of_one_scale,
+    resting_range,
+)
 from hydroid.log.table import Signal, Table
 
 SMALL_COMMAND = 5.0
@@ -28,6 +34,9 @@ def command_entries(
     cells = dict[int, _Cells]()
     for joint, command in commands.items():
         cells[joint] = _cells(table, command.columns)
+    ranges = of_one_scale([of_joint.likely for of_joint in cells.values()])
+    for joint, likely in zip(cells, ranges, strict=True):
+        cells[joint] = cells[joint]._replace(likely=likely)
     usual = _usual_range([*cells.values()])
     entries = dict[int, Entry]()
     for joint, command in commands.items():
@@ -45,6 +54,15 @@ class _Cells(NamedTuple):
     def changes(self) -> bool:
         return bool(np.nanmax(self.values) > np.nanmin(self.values))
 
+    @property
+    def tells(self) -> bool:
+        """Whether it tells a range: it changes, and what is around 0 is ever near it."""
+        if not self.changes or len(self.values) > 1:
+            return self.changes
+        is_around_zero = self.likely is not None and not self.likely.offset
+        values = self.values[np.isfinite(self.values)]
+        return not is_around_zero or comes_near_zero(values)
+
 
 def _cells(table: Table, columns: Sequence[Column]) -> _Cells:
     """Return the cells of one or two columns, NaN where no message has come yet."""
@@ -57,7 +75,7 @@ def _cells(table: Table, columns: Sequence[Column]) -> _Cells:
 
 
 def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
-    """Return the range that more than half of a log's commands that change are in, if
+    """Return the range that more than half of a log's commands that tell one are in, if
     it has a positive middle."""
     ranges = dict[str, CommandRange]()
     names = list[str]()
@@ -68,8 +86,8 @@ def _usual_range(commands: Sequence[_Cells]) -> CommandRange | None:
             names.append(likely.name)
             ranges.setdefault(likely.name, likely)
     most = max(names, key=names.count, default="")
-    changing = sum(cells.changes for cells in commands)
-    if names.count(most) <= changing / 2:
+    telling = sum(cells.tells for cells in commands)
+    if names.count(most) <= telling / 2:
         return None
     return ranges[most]
 

@@ -85,7 +85,7 @@ def guess_columns(
     for column in columns:
         if column.kind == "target":
             reasons.append(
-                f"{column.name}: a target of a position, no valve's opening; a controller lies between"
+                f"{column.name}: a position target of a controller, not a valve's opening"
             )
     unused = _unused(table, time, (*commands.values(), *angles.values()))
     if unused:

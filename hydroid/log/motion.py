@@ -1,6 +1,7 @@
 """How a joint moves in a log: how far and fast, which way, how long after its command,
 above which one."""
 
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -309,3 +310,14 @@ def driven_joints(log: Log) -> dict[int, JointMotion]:
     """Return the motions of the joints that are driven and measured, by number."""
     joints = (np.flatnonzero(log.driven & log.has_angle) + 1).tolist()
     return {joint: motion_of(log, joint) for joint in joints}
+
+
+def stands_still(logs: Sequence[Log], joint: int) -> bool:
+    """Return whether a joint (number, from 1) is driven, by commands that would move
+    it, and its angle is the same to the last digit in all samples of each log."""
+    if any(np.ptp(log.angle_of(joint)) != 0 for log in logs):
+        return False
+    pushed = [
+        log.period * np.sum(np.abs(log.command_of(joint)) >= LEAST_PUSH) for log in logs
+    ]
+    return bool(sum(pushed) >= LEAST_FROZEN)

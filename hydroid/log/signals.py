@@ -17,6 +17,8 @@ USED = 0.1
 """part of half a range beyond which both sides of the middle are used"""
 FARTHEST_REST = 0.3
 """part of half a range by which a command may rest beside the middle"""
+NEAR_ZERO = 0.1
+"""part of the farthest count to which others come near 0"""
 COMMON = 0.05
 """part of the samples that makes 0 a command that is really given"""
 EXACT = 0.02
@@ -39,6 +41,11 @@ class CommandRange(NamedTuple):
         if offset:
             remedy += f" and {setting}.offset: {offset:g}"
         return {"range": self.name, "remedy": remedy}
+
+    @property
+    def counts_around_zero(self) -> bool:
+        """Whether no command is 0, and the whole one more than 100."""
+        return not self.offset and self.scale < 1
 
     @property
     def excludes_zero(self) -> bool:
@@ -156,16 +163,26 @@ def _first_range(
     none does."""
     if not len(values):
         return None
-    low = values.min()
-    high = values.max()
+    fitting = [
+        signal for signal in signals if _fits(signal, values.min(), values.max(), unit)
+    ]
     rests = values[0], _most_frequent(values)
-    for signal in signals:
-        if not _fits(signal, low, high, unit):
-            continue
-        # 0 is the middle of a range from below 0, and needs no proof
-        if signal.low < 0 or _rests_in_the_middle(signal, values, rests):
-            return signal.range
+    proofs = _rests_in_the_middle, _comes_near_zero, _rests_beside, _is_around_zero
+    for is_proved in proofs:
+        for signal in fitting:
+            if is_proved(signal, values, rests):
+                return signal.range
     return None
+
+
+def of_one_scale(
+    ranges: Sequence[CommandRange | None],
+) -> list[CommandRange | None]:
+    """Return the ranges of the commands of one log: of those that count around 0, beyond
+    100, all have the widest."""
+    counts = [found for found in ranges if found and found.counts_around_zero]
+    widest = min(counts, key=lambda found: found.scale, default=None)
+    return [widest if found and found.counts_around_zero else found for found in ranges]
 
 
 def resting_range(
@@ -180,9 +197,10 @@ def resting_range(
     rests in the middle of the usual range, too.
     """
     values = values[~np.isnan(values)]
-    if not len(values) or values[0] != _most_frequent(values):
+    if not len(values):
         return None
-    rest = float(values[0])
+    rest = float(_most_frequent(values))
+    begin = float(values[0])
     candidates = list[CommandRange]()
     if likely and likely.offset:
         candidates.append(likely)
@@ -194,7 +212,8 @@ def resting_range(
         percent_at_rest = scale * rest + command_range.offset
         is_within = np.abs(percent).max() <= 100 * (1 + SLACK)
         known_to_rest = likely is not None and percent_at_rest == 0
-        if known_to_rest:
+        begins_elsewhere = abs(scale * (begin - rest)) > 100 * EXACT
+        if known_to_rest or begins_elsewhere:
             continue
         if is_within and abs(percent_at_rest) <= 100 * FARTHEST_REST:
             offset = float(f"{-scale * rest:.6g}")
@@ -240,11 +259,13 @@ def _fits(signal: CommandSignal, low: float, high: float, unit: str) -> bool:
 def _rests_in_the_middle(
     signal: CommandSignal, values: Array, rests: tuple[float, float]
 ) -> bool:
-    """Return whether cells rest in the middle of a signal, and lie on both sides of it,
-    or on one side if they rest exactly there.
+    """Return whether cells rest in the positive middle of a signal, and lie on both
+    sides of it, or on one side if they rest exactly there.
 
     `rests`: the first cell, and the most frequent one.
     """
+    if signal.low < 0:
+        return False
     near = [abs(rest - signal.middle) <= signal.slack for rest in rests]
     zero_is_given = np.sum(values == 0) >= COMMON * len(values)
     # where 0 is given often, it may be no command, and the middle some other one
@@ -255,3 +276,36 @@ def _rests_in_the_middle(
     if signal.range.excludes_zero and not signal.full and exactly:
         return bool(below or above)
     return bool(enough and below and above)
+
+
+def _comes_near_zero(
+    signal: CommandSignal, values: Array, rests: tuple[float, float]
+) -> bool:
+    """Return whether cells of a signal around 0 are ever near it: counts must be."""
+    return signal.low < 0 and (signal.half <= 100 or comes_near_zero(values))
+
+
+def comes_near_zero(values: Array) -> bool:
+    """Return whether any of the cells of a command, (R,) without NaN, is near 0."""
+    low = values.min()
+    high = values.max()
+    return bool(low <= NEAR_ZERO * high and high >= NEAR_ZERO * low)
+
+
+def _rests_beside(
+    signal: CommandSignal, values: Array, rests: tuple[float, float]
+) -> bool:
+    """Return whether counts rest at one place, beside the middle of a signal."""
+    begin, rest = rests
+    return (
+        signal.low >= 0
+        and signal.half > 100
+        and abs(rest - begin) <= EXACT * signal.half
+        and abs(rest - signal.middle) <= FARTHEST_REST * signal.half
+    )
+
+
+def _is_around_zero(
+    signal: CommandSignal, values: Array, rests: tuple[float, float]
+) -> bool:
+    return signal.low < 0

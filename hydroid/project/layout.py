@@ -4,6 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 
+import numpy as np
+
 from hydroid.arrays import Array, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
@@ -14,9 +16,12 @@ from hydroid.log import (
     Log,
     Table,
     motion_of,
+    stands_still,
 )
 from hydroid.log.clues import column_unit, kind_of
+from hydroid.log.command_sizes import LEAST_COMMAND
 from hydroid.log.mapping import angle_margin
+from hydroid.progress import Progress, no_progress
 from hydroid.project.columns import column_lines
 from hydroid.project.logs import Others, reach_of, read_first, read_others
 from hydroid.project.mirrored import mirror_sensors, of_other_sign
@@ -28,6 +33,11 @@ from hydroid.words import listed
 
 GUESSED = "GUESSED from the log: check every line."
 GIVEN = "As you gave them, compared with the log."
+UNDRIVEN = "no command in the logs, so not compared"
+STANDING = (
+    "driven, but the angle never changes, so not compared; check the sensor, or its "
+    "column in fit.yaml"
+)
 REVERSED = (
     "a reversed command suits a valve that is wired the other way. If a sensor counts the other "
     "way instead (compare arm.png), set scale: -1 at its angle and not at its command: gravity "
@@ -76,6 +86,7 @@ def find_layout(
     *,
     given: LogSettings | None = None,
     others: Others | None = None,
+    progress: Progress = no_progress,
 ) -> Layout:
     """Guess the columns of a log, turn commands that act against the angle,
     and see how fast joints are.
@@ -88,6 +99,7 @@ def find_layout(
         given: what a person says of the columns, which are not guessed then.
         others: further logs of the same columns; a joint that one of them drives can be
             fitted. One that cannot be read by the columns of the first is left out.
+        progress: what is read, or fitted, and how much of it.
 
     Raises:
         SettingsError: no joint has one of the names.
@@ -102,19 +114,25 @@ def find_layout(
     others = others or Others()
     if given is not None:
         guess = _given(table, arm, given)
-        return _seen(table, arm, guess, others, GIVEN)
+        return _seen(table, arm, guess, others, GIVEN, progress)
     guess = guessed_section(table, arm, order)
     if guess.mirrored:
         # sensors without a scale: what one log reaches is not all of their range
-        guess = guessed_section(table, arm, order, [*others.tables()])
+        tables = [*others.tables(progress)]
+        guess = guessed_section(table, arm, order, tables)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
-    return _seen(table, arm, guess, others, GUESSED)
+    return _seen(table, arm, guess, others, GUESSED, progress)
 
 
 def _seen(
-    table: Table, arm: Arm, guess: ColumnGuess, others: Others, origin: str
+    table: Table,
+    arm: Arm,
+    guess: ColumnGuess,
+    others: Others,
+    origin: str,
+    progress: Progress,
 ) -> Layout:
     """Return the layout of columns, with what the logs show of the joints' motion."""
     entries = guess.log["joints"]
@@ -122,24 +140,27 @@ def _seen(
     if origin == GIVEN:
         # a person who names columns knows which way they count
         settings = validate(guess.log, LogSettings, table.source)
-        logs = read_first(table, settings, arm, reasons, strict=True)
+        logs = read_first(table, settings, arm, reasons, progress, strict=True)
     else:
-        settings, logs = _mirrored(table, arm, guess, others, reasons)
+        settings, logs = _mirrored(table, arm, guess, others, reasons, progress)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
+    driven = _with_command(entries, measured)
     left_out = list[Path]()
     reach = dict[int, tuple[float, float]]()
-    if logs:
-        fitted, unseen, left_out = read_others(table, settings, arm, others, reasons)
-        logs += fitted
-        reach = reach_of([*logs, *unseen], measured)
-    driven = [joint for joint in measured if entries[joint]["command"] is not None]
     motions = dict[int, JointMotion]()
     if logs:
+        fitted, unseen, left_out = read_others(
+            table, settings, arm, others, reasons, progress
+        )
+        logs += fitted
+        reach = reach_of([*logs, *unseen], measured)
         motions = {joint: motion_of(logs[0], joint) for joint in measured}
         _refuse_rest(table, driven, logs, arm.joint_names)
         driven = _driven(driven, logs, arm.joint_names, reasons)
     wrong = _turn_commands(entries, motions, arm, reasons)
     reasons += _lacking(entries, arm.joint_names)
+    if origin == GUESSED:
+        _forget_standing(entries, measured, logs)
     undriven = [motion for joint, motion in motions.items() if joint not in driven]
     return Layout(
         guess.log,
@@ -148,26 +169,45 @@ def _seen(
         guess.unused,
         motions,
         followed=any(motion.travel > FOLLOWED for motion in undriven),
-        valves=_valves(logs, driven, wrong),
+        valves=_valves(logs, driven, wrong, progress),
         left_out=tuple(left_out),
         reach=reach,
         origin=origin,
     )
 
 
+def _with_command(entries: Mapping[int, Plain], joints: Sequence[int]) -> list[int]:
+    return [joint for joint in joints if entries[joint]["command"] is not None]
+
+
+def _forget_standing(
+    entries: dict[int, Plain], joints: Sequence[int], logs: Sequence[Log]
+) -> None:
+    """Leave out the commands of joints that stand still: a guessed valve would swing a
+    joint of which nothing is known."""
+    for joint in joints:
+        if stands_still(logs, joint):
+            entries[joint]["command"] = None
+
+
 def _mirrored(
-    table: Table, arm: Arm, guess: ColumnGuess, others: Others, reasons: list[str]
+    table: Table,
+    arm: Arm,
+    guess: ColumnGuess,
+    others: Others,
+    reasons: list[str],
+    progress: Progress,
 ) -> tuple[LogSettings, list[Log]]:
     """Return the settings and logs of guessed columns, those turned round that count
     backwards."""
     settings = validate(guess.log, LogSettings, table.source)
-    logs = read_first(table, settings, arm, reasons, strict=False)
+    logs = read_first(table, settings, arm, reasons, progress, strict=False)
     backwards = mirror_sensors(logs, guess, arm, in_range=others.in_range)
     if backwards:
         reasons += backwards
         settings = validate(guess.log, LogSettings, table.source)
         # what it says of the log is the same
-        logs = read_first(table, settings, arm, [], strict=False)
+        logs = read_first(table, settings, arm, [], progress, strict=False)
     return settings, logs
 
 
@@ -184,12 +224,18 @@ def _given(table: Table, arm: Arm, given: LogSettings) -> ColumnGuess:
 def _driven(
     joints: Sequence[int], logs: Sequence[Log], names: Sequence[str], reasons: list[str]
 ) -> list[int]:
-    """Return the joints that any log drives; of the others say so."""
-    driven = [joint for joint in joints if any(log.drives(joint) for log in logs)]
-    idle = [names[joint - 1] for joint in joints if joint not in driven]
-    if idle:
-        reasons.append(f"{listed(idle)}: no command in the logs, so not compared")
-    return driven
+    """Return the joints that any log drives, by more than the noise of a lever, and
+    whose angle changes; of the others say so."""
+    idle = list[int]()
+    for joint in joints:
+        most = max(np.abs(log.command_of(joint)).max() for log in logs)
+        if most < LEAST_COMMAND:
+            idle.append(joint)
+    standing = [k for k in joints if stands_still(logs, k)]
+    for left_out, why in ((idle, UNDRIVEN), (standing, STANDING)):
+        if left_out:
+            reasons.append(f"{listed([names[k - 1] for k in left_out])}: {why}")
+    return [k for k in joints if k not in (*idle, *standing)]
 
 
 def _turn_commands(
@@ -216,7 +262,10 @@ def _turn_commands(
 
 
 def _valves(
-    logs: Sequence[Log], joints: Sequence[int], wrong: Sequence[int]
+    logs: Sequence[Log],
+    joints: Sequence[int],
+    wrong: Sequence[int],
+    progress: Progress,
 ) -> dict[int, JointStart]:
     """Return the valves of joints that follow their logged commands.
 
@@ -224,7 +273,8 @@ def _valves(
     then turned.
     """
     valves = dict[int, JointStart]()
-    for joint in joints:
+    for number, joint in enumerate(joints):
+        progress("finding starts of valves: joint", number, len(joints))
         valve = fitted_valve(logs, joint)
         if valve is not None:
             valves[joint] = valve.turned if joint in wrong else valve
@@ -310,7 +360,8 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
         _, against = motion.directed
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
-    if motion.log.drives(motion.joint) and motion.dead_band > 10:
+    moves = np.ptp(angle) > 0 and motion.log.drives(motion.joint)
+    if moves and motion.dead_band > 10:
         below = f"below about {motion.dead_band:g} % of command"
         yield f"{joint.name} hardly moves {below}: a dead band, or little opening"
 

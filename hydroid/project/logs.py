@@ -11,6 +11,7 @@ import numpy as np
 from hydroid.arrays import Limits
 from hydroid.errors import LogError
 from hydroid.log import Log, LogFinding, Reading, Table, check_parts, open_table
+from hydroid.progress import Progress
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
 
@@ -28,11 +29,11 @@ class Others(NamedTuple):
     """whether they must be within the arm's ranges, if the first one is; not where
     these ranges are guesses"""
 
-    def tables(self) -> Iterator[Table]:
+    def tables(self, progress: Progress) -> Iterator[Table]:
         """Yield the tables of all of them that can be opened."""
         for path in self.paths:
             with suppress(LogError):
-                yield open_table(path)
+                yield open_table(path, progress=progress)
 
     @property
     def paths(self) -> list[Path]:
@@ -45,6 +46,7 @@ def read_first(
     settings: LogSettings,
     arm: Arm,
     reasons: list[str],
+    progress: Progress,
     *,
     strict: bool,
 ) -> list[Log]:
@@ -55,19 +57,25 @@ def read_first(
     """
     path = Path(table.source)
     limits = _no_limits(arm)
-    parts, findings = check_parts(path, settings, limits, Reading(arm=arm))
+    reading = Reading(arm=arm)
+    parts, findings = check_parts(path, settings, limits, reading, progress)
     if not parts:
         if strict:
             raise findings[0].error()
         reasons.append(f"the log cannot be used as it is: {findings[0]}")
         repaired = Reading(arm=arm, repair=True)
-        parts, _ = check_parts(path, settings, limits, repaired)
+        parts, _ = check_parts(path, settings, limits, repaired, progress)
     reasons += _said(findings)
     return _longest_first(parts)
 
 
 def read_others(
-    table: Table, settings: LogSettings, arm: Arm, others: Others, reasons: list[str]
+    table: Table,
+    settings: LogSettings,
+    arm: Arm,
+    others: Others,
+    reasons: list[str],
+    progress: Progress,
 ) -> tuple[list[Log], list[Log], list[Path]]:
     """Read the other logs; return those that are fitted, the unseen one, and those that
     cannot be read as the first one is: by its columns, units and ranges."""
@@ -78,11 +86,12 @@ def read_others(
         return fitted, unseen, left_out
     reading = Reading(arm=arm)
     limits = arm.ranges
-    first, _ = check_parts(Path(table.source), settings, limits, reading)
+    path = Path(table.source)
+    first, _ = check_parts(path, settings, limits, reading, progress)
     if not first or not others.in_range:
         limits = _no_limits(arm)
     for path in others.paths:
-        parts, findings = check_parts(path, settings, limits, reading)
+        parts, findings = check_parts(path, settings, limits, reading, progress)
         if not parts:
             left_out.append(path)
             reasons.append(f"left out of the commands below: {findings[0]}")

@@ -16,6 +16,7 @@ from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, fill_template, undisturbed, write_atomic, writing
 from hydroid.log import Table, open_table
 from hydroid.log.mapping import angle_margin
+from hydroid.progress import Progress, no_progress
 from hydroid.project.boxes import boxes_urdf, moves_as
 from hydroid.project.layout import Layout, find_layout
 from hydroid.project.logs import Others
@@ -63,6 +64,7 @@ def write_project(
     robot: Path | None,
     logs: Sequence[Path],
     joints: Sequence[str],
+    progress: Progress = no_progress,
     **options: Any,
 ) -> Project:
     """Write a project to a folder, new or with other things in it (`hydroid.init` says
@@ -71,7 +73,7 @@ def write_project(
     lengths = options.pop("lengths", ())
     table = None
     if logs:
-        table = open_table(logs[0])
+        table = open_table(logs[0], progress=progress)
     has_own_file = robot is not None and robot.suffix.lower() in (".yaml", ".yml")
     imported = None
     if robot is not None and not has_own_file:
@@ -87,12 +89,12 @@ def write_project(
         else:
             reference = ARM
             arm = _write_arm(stage, imported)
-        layout = _layout(table, arm, joints, logs, in_range=not lengths)
+        layout = _layout(table, arm, joints, logs, progress, in_range=not lengths)
         wider = _wider(arm, layout)
         if lengths and wider:
             imported = _arm_of_boxes(joints, lengths, options, wider)
             arm = _write_arm(stage, imported)
-            layout = _layout(table, arm, joints, logs, in_range=False)
+            layout = _layout(table, arm, joints, logs, progress, in_range=False)
         sizes = _sizes(arm, layout)
         notes = list[str]()
         if imported is not None:
@@ -110,12 +112,13 @@ def _layout(
     arm: Arm,
     joints: Sequence[str],
     logs: Sequence[Path],
+    progress: Progress,
     *,
     in_range: bool,
 ) -> Layout:
     """Return what logs hold, the first of which is the table."""
     others = Others(_fitted(logs)[1:], _unseen(logs), in_range)
-    return find_layout(table, arm, joints, others=others)
+    return find_layout(table, arm, joints, others=others, progress=progress)
 
 
 def _wider(arm: Arm, layout: Layout) -> dict[str, Limits]:
@@ -171,7 +174,12 @@ def _stand_ins(arm: Arm) -> Iterator[str]:
 
 
 def go_on(
-    folder: Path | None, config: Path, logs: Sequence[Path], *, force: bool
+    folder: Path | None,
+    config: Path,
+    logs: Sequence[Path],
+    progress: Progress = no_progress,
+    *,
+    force: bool,
 ) -> Project:
     """Write the settings anew, with starts from the logs,
     whose columns a person has named in `config`.
@@ -189,9 +197,11 @@ def go_on(
     folder = folder or config.parent
     replaces_config = config.resolve() == (folder / FIT).resolve()
     _refuse_replacing(folder, (FIT, STEPS, PICTURE), force=force or replaces_config)
-    table = open_table(logs[0], settings.log)
+    table = open_table(logs[0], settings.log, progress)
     others = Others(_fitted(logs)[1:], _unseen(logs))
-    layout = find_layout(table, arm, given=settings.log, others=others)
+    layout = find_layout(
+        table, arm, given=settings.log, others=others, progress=progress
+    )
     steps = _steps(folder, logs, layout)
     reference = _seen_from(folder, Path(arm.where))
     text = fit_text(

@@ -19,7 +19,7 @@ from hydroid.reporting.actuator_tables import (
 )
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
 from hydroid.reporting.page import Cell, Plot, Section, Table
-from hydroid.reporting.parameters_report import SIDES, direction_word, first_joint
+from hydroid.reporting.parameters_report import SIDES, direction_word
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
@@ -30,16 +30,16 @@ STILL = 20.0
 """by how much a command that stands still may change [%]: a joystick never rests"""
 AT_END = 0.02
 """part of a joint's travel in the logs within which it may stand at a stop"""
-DEAD_BANDS = ("dead_band", "dead_band_a", "dead_band_b")
-"""quantities"""
 TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
 """endings of curves, as `posterior.quantities` names directions, and their colours"""
 
 _SPEED = (
-    "Lines: the model's steady speed at mid travel, with the sign of the angle, and how far the "
-    "valve is open then. Bands: 95 % intervals. Points: measured speeds, in any pose and under any "
-    "load, against the command one dead time earlier. Grey: commands that the logs do not "
-    "contain."
+    "Dead band: up to this command the valve stays shut; at 0 % the smallest command opens it. "
+    "Fixed: the fit does not estimate it. "
+    "Lines: the model's steady speed at mid travel, with the sign of the angle, and the opening "
+    "of the valve. Bands: 95 % confidence intervals. Points: measured speeds, in any pose and "
+    "under any load, against the command one dead time earlier. Grey: commands that the logs do "
+    "not contain."
 )
 _SPEED_ALONE = (
     "Lines: the model's steady speed at mid travel, with the sign of the angle. Bands: 95 % "
@@ -68,14 +68,12 @@ def speed_section(
     fastest = list[str]()
     shut = list[str]()
     cards = dict[str, Table]()
-    opens = False
     for joint in settings.outputs:
         name = settings.arm.name_of(joint)
         speed = summary.curves.get(f"{name}_speed")
         if speed is None:
             continue
         opening = summary.curves.get(f"{name}_opening")
-        opens = opens or opening is not None
         cloud = _measured_cloud(logs, joint, _dead_times(name, summary))
         cloud[1] *= settings.arm.joint(joint).shown.factor
         commands = np.concatenate([log.command_of(joint) for log in logs])
@@ -84,34 +82,53 @@ def speed_section(
         caption = f"{name}: {speed.label}"
         tabs.append(Plot(f"speed_{len(tabs) + 1}", caption, draw, button=name))
         fastest.append(f"{name} {_fastest(speed, commands)}")
-        if band := _dead_band(settings, summary, joint):
-            shut.append(f"{name} {band}")
+        if opening is not None:
+            shut.append(f"{name} {_dead_bands(settings, summary, joint)}")
         cards[f"speed_{name}"] = speed_table(name, speed, opening, cloud)
     if not tabs:
         return None
     title = "Speed against command"
     text = _SPEED_ALONE
-    if opens:
-        title = "Speed and valve against command"
-        text = _SPEED
-    text += _TABLE
     answer = f"fastest: {listed(fastest)}"
     if shut:
+        title = "Valve: dead band, opening, and speed against command"
+        text = _SPEED
         answer = f"dead band: {listed(shut)}; {answer}"
+    text += _TABLE
     return Section(
         title, text, tabs=tuple(tabs), cards=cards, folded=True, answer=answer
     )
 
 
-def _dead_band(settings: FitSettings, summary: FitSummary, joint: int) -> str:
-    """Write the dead bands that a joint has for itself, narrower first [%]; nothing
-    without one."""
-    values = set[float]()
+def _dead_bands(settings: FitSettings, summary: FitSummary, joint: int) -> str:
+    """Write the dead bands of a joint for positive and for negative commands."""
+    values, estimated = zip(
+        *(_dead_band(settings, summary, joint, side) for side in SIDES), strict=True
+    )
+    positive, negative = map(two_digits, values)
+    words = f"+{positive} and −{negative} %"
+    if positive == negative:
+        words = f"{positive} %"
+    return words if any(estimated) else f"{words} (fixed)"
+
+
+def _dead_band(
+    settings: FitSettings, summary: FitSummary, joint: int, side: str
+) -> tuple[float, bool]:
+    """Return the dead band of a side of a joint [%], and whether the fit estimates
+    it."""
+    # the spool's overlap included
+    whole = f"{settings.arm.name_of(joint)}_dead_band_{SIDES[side]}"
+    if whole in summary.quantities:
+        return summary.quantities[whole].value, True
+    of_side = f"dead_band_{side.lower()}"
     for name, parameter in settings.parameters.items():
-        if first_joint(settings, name) == joint and parameter.quantity in DEAD_BANDS:
-            values.add(summary.estimate[name].value)
-    words = list(dict.fromkeys(map(two_digits, sorted(values))))
-    return f"{listed(words)} %" if words else ""
+        is_here = joint in (parameter.joints or ())
+        # an effect of a group of logs adds to the dead band
+        is_effect = parameter.per is not None
+        if is_here and not is_effect and parameter.quantity in ("dead_band", of_side):
+            return summary.estimate[name].value, parameter.fixed is None
+    return getattr(settings.hydraulics, of_side), False
 
 
 def _fastest(speed: CurveEstimate, commands: Array) -> str:

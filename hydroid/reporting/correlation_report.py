@@ -1,4 +1,4 @@
-"""Which parameters trade against each other: the correlations of their estimates."""
+"""Which parameters can stand in for each other: the correlations of their estimates."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -77,7 +77,7 @@ def correlation_section(settings: FitSettings, summary: FitSummary) -> Section |
     if points:
         first, second, value = pairs[0]
         answer = f"strongest: {first} and {second}, {_signed(value)}"
-    title = "Which parameters trade?"
+    title = "Which parameters are correlated?"
     tabs = tuple(_maps(settings, matrix, names))
     return Section(title, _TEXT, points, tabs=tabs, folded=True, answer=answer)
 
@@ -86,7 +86,7 @@ def _maps(
     settings: FitSettings, matrix: Array, names: tuple[str, ...]
 ) -> Iterator[Plot]:
     """Yield the map of all parameters, or, where these are too many to be read, a map
-    for each joint: its parameters, and those of others that trade with them."""
+    for each joint: its parameters, and those of others that are correlated with them."""
     if len(names) <= READABLE:
         draw = partial(correlation_map, matrix, names)
         yield Plot("correlation", "Correlations of the estimates.", draw)
@@ -94,8 +94,8 @@ def _maps(
     joints = [first_joint(settings, name) for name in names]
     for number in sorted(set(joints)):
         is_own = np.array(joints) == number
-        trades = np.abs(matrix[is_own]).max(axis=0) >= NOTABLE
-        shown = np.flatnonzero(is_own | trades)
+        correlated = np.abs(matrix[is_own]).max(axis=0) >= NOTABLE
+        shown = np.flatnonzero(is_own | correlated)
         own = tuple(names[i] for i in shown)
         draw = partial(correlation_map, matrix[np.ix_(shown, shown)], own)
         button = "shared by all"

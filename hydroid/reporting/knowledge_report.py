@@ -82,8 +82,9 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
             header = ("quantity", "value", "unit", "interval")
             cards[f"known_{name}"] = Table(name, header, tuple(rows))
     text = (
-        "The best known quantity of each kind, with a 95 % interval. Intervals are right "
-        "only if the model is right. All quantities are listed further down."
+        "The best known quantity of each kind, with its 95 % confidence interval. It holds "
+        "only if the model is right: see “Confidence intervals” below. All quantities are listed "
+        "further down."
     )
     return Section("What is known", text, cards=cards) if cards else None
 
@@ -135,6 +136,7 @@ def error_section(
     inside = {verdict.joint: verdict.inside_percent for verdict in verdicts}
     rows = list[dict[str, Any]]()
     after = list[str]()
+    held = list[str]()
     for joint in settings.outputs:
         error = summary.errors.get(f"q{joint}")
         if error is None:
@@ -145,6 +147,9 @@ def error_section(
         factor = shown.of_degrees(1.0)
         ahead = factor * error.after_10_s_deg
         after.append(f"{name} {two_digits(ahead)} {unit}")
+        share = inside.get(joint)
+        if share is not None:
+            held.append(f"{name} {two_digits(share)} %")
         rows.append(
             {
                 "joint": name,
@@ -152,22 +157,24 @@ def error_section(
                 "sensor's noise": factor * error.sensor_deg,
                 "uncertain after 10 s": ahead,
                 "error persists for [s]": error.lasts_s or None,
-                INSIDE: inside.get(joint),
+                INSIDE: share,
             }
         )
     if not rows:
         return None
     text = (
-        "Even with exact parameters a prediction is uncertain, because other "
-        "influences than the commands add up."
+        "Even with exact parameters a prediction is uncertain, because not only the commands "
+        "move the joints. These other influences add up over time."
     )
     note = (
         "Standard deviations. After 10 s: of a joint that moves at the mean speed of the logs. "
         "An error that persists comes from the model, not from the sensor. Empty: none persists."
     )
     columns = {name: name for name in rows[0]}
-    if not any(row[INSIDE] for row in rows):
-        # no unseen log tells
+    answer = f"standard deviation after 10 s: {listed(after)}"
+    if held:
+        answer += f"; unseen samples inside the 95 % bands: {listed(held)}"
+    else:
         del columns[INSIDE]
     table = Table.of("", columns, rows, note)
     return Section(
@@ -175,5 +182,5 @@ def error_section(
         text,
         tables={"prediction_errors": table},
         folded=True,
-        answer=f"standard deviation after 10 s: {listed(after)}",
+        answer=answer,
     )

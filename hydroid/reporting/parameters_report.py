@@ -123,7 +123,7 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         row["by log"] = interval_words(*estimate.interval_by_log)
         row["source"] = source
         rows.append(row)
-    note = "side A: positive commands, side B: negative ones. interval: 95 %."
+    note = "side A: positive commands, side B: negative ones. interval: 95 % confidence interval."
     if summary.left_out_deg:
         note += _BY_LOG
     return Table.of("Parameters", {name: name for name in columns}, rows, note)

@@ -20,11 +20,12 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
 _TEXT = (
-    "The test takes the innovations: the part of each sample that earlier samples do not "
-    "predict. If the model is right, they are correlated neither with themselves nor with the "
-    "command, and 95 % of the correlations lie in the grey band. With many samples the band "
-    f"is narrow: a correlation of {FAINT:g} or less does not matter. Table: the largest "
-    "correlations, and the share of them outside the band."
+    "The 95 % confidence intervals hold only if the model is right. This test can show that it is "
+    "not. It takes the innovations: the part of each sample that earlier samples do not predict. "
+    "If the model is right, they are correlated neither with themselves nor with the command, and "
+    "95 % of the correlations lie in the grey band. With many samples the band is narrow: a "
+    f"correlation of {FAINT:g} or less does not matter. Table: the largest correlations, and the "
+    "share of them outside the band."
 )
 _HEADER = (
     "joint",
@@ -65,7 +66,7 @@ def residual_section(
         if with_command > FAINT:
             by_command.append(f"{name} {two_digits(with_command)}")
     return Section(
-        "Are the residuals white?",
+        "Confidence intervals: are the residuals white?",
         _TEXT,
         tables={"residuals": Table("", _HEADER, tuple(rows))},
         tabs=tuple(tabs),
@@ -82,7 +83,7 @@ def _answer(by_itself: Sequence[str], by_command: Sequence[str]) -> str:
     if by_command:
         answers.append(f"with the command: {listed(by_command)}")
     if answers:
-        return f"no; {'; '.join(answers)}"
+        return f"no, the intervals may be too narrow; {'; '.join(answers)}"
     return f"yes: no correlation is above {FAINT:g}"
 
 

@@ -21,6 +21,8 @@ TOLERANCE = 1e-12
 """of the box-constrained minimum: slope, in units of a column and the residual,
 that is only rounding"""
 DAMPING = 1e-3  # λ at the start
+NONE = -1
+"""parameter held where none is"""
 BLOCK = 4096  # rows of a tall matrix that are factorised at a time
 
 
@@ -56,6 +58,7 @@ class Descent:
         fresh: whether the Jacobian is one of finite differences, not an updated one.
         cycle: cost, and number of evaluations, when the Jacobian was taken, shape (2,).
         damping: λ.
+        held: parameter that the last step held where it was; NONE: none.
         slow: steps in a row with gains below the tolerance.
         evaluations: candidates simulated. iterations: steps that helped.
         ending: why it ended, or UNDER_WAY.
@@ -69,6 +72,7 @@ class Descent:
     fresh: bool = False
     cycle: Array | tuple[float, int] = (np.inf, 0)
     damping: float = DAMPING
+    held: int = NONE
     slow: int = 0
     evaluations: int = 1
     iterations: int = 0
@@ -129,27 +133,32 @@ class LinearModel:
     """The linear model r + J s of the residual around a descent's point,
     for the parameters with effect.
 
-    A column of J of a parameter without effect is 0; `scale` has the lengths of the
-    others.
+    A column of J of a parameter without effect is 0. `moving` has the numbers of the
+    others, and `scale` the lengths of their columns.
     """
 
     def __init__(self, at: Descent) -> None:
         self.at = at
         length = np.linalg.norm(at.jacobian, axis=0)
-        self._moving = np.flatnonzero(length > 0)
-        self.scale = length[self._moving]
+        self.moving = np.flatnonzero(length > 0)
+        self.scale = length[self.moving]
         self._triangle, self._right = self.reduced(at.residual)
 
     def reduced(self, row: Array) -> tuple[Array, Array]:
         """Triangle R and vector b such that |row + J s|² is |b + R s|² and a constant."""
-        p = len(self._moving)
-        jacobian = self.at.jacobian[:, self._moving]
+        p = len(self.moving)
+        jacobian = self.at.jacobian[:, self.moving]
         # factorised together: Q is then never formed
         both = triangle(np.column_stack([jacobian, row]))
         return both[:p, :p], both[:p, p]
 
-    def step(self, damping: float, row: Array | None = None) -> Array:
-        """Minimise |row + J s|² + damping |D s|² inside the box; s of shape (moving,)."""
+    def step(
+        self, damping: float, row: Array | None = None, *, held: int = NONE
+    ) -> Array:
+        """Minimise |row + J s|² + damping |D s|² inside the box; s of shape (moving,).
+
+        A parameter that is held does not move.
+        """
         triangle = self._triangle
         right = self._right
         if row is not None:
@@ -160,9 +169,10 @@ class LinearModel:
         # in lengths of the columns and of the residual, in which the solver's
         # tolerances mean something
         unit = self.scale / size
-        point = self.at.point[self._moving]
+        point = self.at.point[self.moving]
         damped = np.sqrt(damping) * np.eye(len(unit))
-        matrix = np.vstack([triangle / self.scale, damped])
+        effects = np.where(self.moving == held, 0.0, triangle / self.scale)
+        matrix = np.vstack([effects, damped])
         target = np.append(-right / size, np.zeros(len(unit)))
         lower = -point * unit
         upper = (1 - point) * unit
@@ -183,9 +193,9 @@ class LinearModel:
     def reach(self, s: Array) -> Array:
         """Return the point of the box that a step leads to, shape (p,)."""
         point = self.at.point.copy()
-        reached = point[self._moving] + s
+        reached = point[self.moving] + s
         # rounding leads out of the box
-        point[self._moving] = np.clip(reached, 0.0, 1.0)
+        point[self.moving] = np.clip(reached, 0.0, 1.0)
         return point
 
 

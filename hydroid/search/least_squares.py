@@ -26,13 +26,17 @@ What else differs from a textbook:
   curvature of the residual along the first (geodesic acceleration, M. K. Transtrum and
   J. P. Sethna, 2012). It follows the curved valleys of problems whose parameters
   compensate each other.
+- A response may have an edge: a machine that just leaves its stop, or does not. Steps
+  that lead over it do not help, however short, although the linear model promises much.
+  Before least squares ends so, it tries steps that hold one parameter each where it
+  is. With the one that leads over the edge held, the others move on.
 - A parameter without effect stays where it is: its column of J is zero, or rounding
   noise (`derivatives`).
 - A candidate whose simulation fails is a step that does not help.
 """
 
 from dataclasses import replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -40,6 +44,7 @@ from hydroid.arrays import Array
 from hydroid.search.axes import Function
 from hydroid.search.descent import (
     DAMPING,
+    NONE,
     Descent,
     Ending,
     LinearModel,
@@ -62,12 +67,23 @@ CURVED = 2.0
 """a correction this many times longer than the step itself is not believed"""
 TRUSTED = 0.3
 """part of the promised gain that a step must bring for its Jacobian to be updated"""
+PROMISING = 0.1
+"""part of the cost that is promised beside an edge; near an optimum it is far less"""
+FIRM = (1e-2, 1.0)
+"""λ of the steps that hold a parameter"""
 SHORTEST = 1e-14
 """relative length below which a step is none"""
 EXACT = 1e-24
 """part of the first cost at which nothing is left to explain"""
 SLOW_STEPS = 2
 """steps in a row that may gain less than the tolerance"""
+
+
+class _Try(NamedTuple):
+    """A step, and the parameter that it holds, if any."""
+
+    step: Array
+    held: int = NONE
 
 
 def least_squares(
@@ -119,33 +135,47 @@ def _differentiate(
 
 
 def _advance(now: State, residuals: Function, settings: RefinementSettings) -> State:
-    """Try a step, or two; take the better one if it helps."""
+    """Try a step, or several; take the best one if it helps."""
     model = LinearModel(now)
-    first = model.step(now.damping)
-    steps = [first]
-    if now.fresh and np.linalg.norm(first) > SHORTEST:
-        corrected = _corrected(now, model, first, residuals)
-        if corrected is not None:
-            steps.append(corrected)
+    tried = _tried(now, model, residuals)
+    first = tried[0].step
     # inside the box, so that a step may be shorter than it was solved for
-    points = np.array([model.reach(s) for s in steps])
+    points = np.array([model.reach(one.step) for one in tried])
     moved = np.linalg.norm(points[0] - now.point)
     if moved <= SHORTEST * np.linalg.norm(now.point):
         return _no_step(now)
-    # both in one batch: they are simulated at the same time
+    # in one batch: they are simulated at the same time
     rows = residuals(points)
     cost = costs(rows)
     best = np.argmin(cost)
     if not cost[best] < now.cost:
-        return _without_gain(now, model, settings)
+        return _without_gain(now, model, residuals, settings)
+    taken = tried[best]
     promised = model.gain(first)
+    if taken.held != NONE:
+        promised = model.gain(taken.step)
     ratio = 0.0
     if promised > 0:
         ratio = (now.cost - cost[best]) / promised
     after = _moved(now, points[best], rows[best], ratio, settings)
+    after = replace(after, held=taken.held)
     if after.ended or not _keeps_jacobian(now, after, ratio):
         return after
     return replace(after, jacobian=_updated(now, after))
+
+
+def _tried(now: Descent, model: LinearModel, residuals: Function) -> list[_Try]:
+    """Return the steps that are tried: the damped one, where the Jacobian is new its
+    correction, and where the last step held a parameter one that holds it too."""
+    first = model.step(now.damping)
+    tried = [_Try(first)]
+    if now.fresh and np.linalg.norm(first) > SHORTEST:
+        corrected = _corrected(now, model, first, residuals)
+        if corrected is not None:
+            tried.append(_Try(corrected))
+    if now.held != NONE:
+        tried.append(_Try(model.step(now.damping, held=now.held), now.held))
+    return tried
 
 
 def _corrected(
@@ -169,7 +199,10 @@ def _corrected(
 
 
 def _without_gain(
-    now: State, model: LinearModel, settings: RefinementSettings
+    now: State,
+    model: LinearModel,
+    residuals: Function,
+    settings: RefinementSettings,
 ) -> State:
     """Take a new Jacobian, or a shorter step, after a step that does not help."""
     if not now.fresh:
@@ -178,7 +211,30 @@ def _without_gain(
     promised = model.gain(model.step(after.damping))
     if promised >= settings.gain_tolerance * now.cost:
         return after
-    return _no_step(now)
+    if model.gain(model.step(UNDAMPED)) < PROMISING * now.cost:
+        return _no_step(now)
+    return _beside_an_edge(now, model, residuals, settings)
+
+
+def _beside_an_edge(
+    now: State,
+    model: LinearModel,
+    residuals: Function,
+    settings: RefinementSettings,
+) -> State:
+    """Take the best of the steps that hold one parameter each; end where none helps."""
+    tried = [(held, damping) for damping in FIRM for held in model.moving.tolist()]
+    steps = [model.step(damping, held=held) for held, damping in tried]
+    points = np.array([model.reach(s) for s in steps])
+    rows = residuals(points)
+    cost = costs(rows)
+    best = np.argmin(cost)
+    if now.cost - cost[best] < settings.gain_tolerance * now.cost:
+        return _no_step(now)
+    held, damping = tried[best]
+    ratio = (now.cost - cost[best]) / model.gain(steps[best])
+    from_here = replace(now, damping=damping, held=held)
+    return _moved(from_here, points[best], rows[best], ratio, settings)
 
 
 def _keeps_jacobian(now: Descent, after: Descent, ratio: float) -> bool:

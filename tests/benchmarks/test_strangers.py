@@ -93,3 +93,15 @@ def test_a_written_log_is_read_as_it_was_recorded(tmp_path):
     assert log.held[0] == pytest.approx(log.command[0])
     middle = (machine.ends.mean(axis=1) - log.start) / np.ptp(machine.ends, axis=1)
     assert np.all(np.abs(middle) < 0.16)  # it starts within the middle third
+
+
+def test_the_curves_of_bent_valves_are_fitted_too():
+    machine = Machine(
+        np.random.default_rng([44, 0]), 0, np.random.default_rng([44, 0, 2])
+    )
+    places = [place for place in numbers(machine) if place[0] == "rises"]
+    assert len(places) == machine.joints * 2 * 4
+    other = moved(machine, places, np.resize([-3.0, 3.0], len(places)))
+    assert (np.diff(other.curve, axis=2) >= 0).all()
+    np.testing.assert_allclose(other.curve[:, :, [0, -1]], [[[0, 1]] * 2] * 5)
+    assert np.abs(other.curve - machine.curve).max() > 0.05

@@ -403,7 +403,7 @@ FIELD_LOGS = (
     FieldLog(
         "a draw wire that is too short",
         wires("wire_mm", 0, 400, clip=0.6),
-        "stands to the last digit",
+        "is frozen",
     ),
     FieldLog("an encoder that slips", changed(_jump), "jumps by"),
     FieldLog(
@@ -481,7 +481,7 @@ def followed(
     words = ["followed", "--log", "log.csv"]
     found = follow(folder, words, "other.csv", budget, known)
     speeds = _speeds(make_truth(log.steps, arm), arm)
-    found = judged(found, speeds)
+    found = judged(found, speeds, max(map(abs, log.steps)))
     return Outcome(found.verdict, found.line)
 
 

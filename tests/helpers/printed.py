@@ -39,7 +39,7 @@ class Followed:
     Attributes:
         refused: a line that ended them; empty if all ran.
         lines: all that was printed.
-        errors: unseen error and that of standing still [deg], by joint.
+        errors: unseen error and that of standing still [deg, mm], by joint.
         blamed: joints whose verdict is that the fit fails.
         wrong: how joints move otherwise than what made the logs, by joint.
         run: folder of the fit.
@@ -178,7 +178,8 @@ def _run(arguments: Sequence[str]) -> list[str]:
 def _errors(verdict: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
     found = dict[str, tuple[float, float]]()
     for joint in verdict:
-        unseen = joint["unseen_deg"]
-        still = joint["baselines_deg"]["standing still"]
+        unit = "mm" if "unseen_mm" in joint else "deg"
+        unseen = joint[f"unseen_{unit}"]
+        still = joint[f"baselines_{unit}"]["standing still"]
         found[joint["name"]] = math.inf if unseen is None else unseen, still
     return found

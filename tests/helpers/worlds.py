@@ -347,7 +347,7 @@ def followed(
     """Write an arm and two logs, and follow the commands that `init` prints, validated
     on the second log.
 
-    Returns the outcome, and unseen errors (and those of standing still) [deg], or why
+    Returns the outcome, and unseen errors (and those of standing still) [deg, mm], or why
     it was refused. What is `known` is not fitted again.
     """
     robot = world.write(world, folder)

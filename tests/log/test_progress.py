@@ -4,10 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from field_logs import make_truth, table, text
 from log_files import NAMES
 from log_formats import BagWriter
 
 from hydroid.log import open_table
+from hydroid.project.project import write_project
 
 
 def test_a_long_csv_reports_megabytes(tmp_path: Path) -> None:
@@ -35,3 +37,12 @@ def test_a_bag_reports_messages(
     open_table(path, progress=lambda *what: said.append(what))
     assert [done for _, done, _ in said] == [0, 100, 200, 300, 400, 500]
     assert {total for *_, total in said} == {585}
+
+
+def test_init_reports_what_it_reads_and_fits(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text(table(make_truth((70, -60, 100)))))
+    said = list[tuple[str, int, int]]()
+    write_project(tmp_path / "mine", None, [path], [], lambda *what: said.append(what))
+    assert ("reading log.csv, MB", 0, 0) in said
+    assert ("finding starts of valves: joint", 1, 2) in said

@@ -73,6 +73,11 @@ FAULTS = {
     "backwards": (values(lambda t: t[::-1]), "line 3, column time_s", "does not increase"),
     "short": (values(lambda t: t[:20]), "column time_s", "at least 0.5 s is needed"),
     "empty": (values(lambda t: t[:0]), "column time_s", "samples: 0"),
+    "every 6 s": (
+        values(lambda t: t * [600, 1, 1, 1, 1]),
+        "column time_s",
+        "every 6 s, at most 0.1 s can be used; take more samples, or check",
+    ),
     "ks": (values(lambda t: t * [0.001, 1, 1, 1, 1]), "column time_s", "log.time.unit"),
 }  # fmt: skip
 """change of a file, and place and words of its only fault"""

@@ -5,8 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hydroid.log import guess_columns, open_table
-from hydroid.log.signals import SIGNALS, CommandRange, CommandSignal, likely_range
+from hydroid.log import check_parts, guess_columns, open_table
+from hydroid.log.signals import (
+    SIGNALS,
+    CommandRange,
+    CommandSignal,
+    likely_range,
+    resting_range,
+)
 from hydroid.settings.log import LogSettings
 
 PAGE = Path(__file__).parents[2] / "docs" / "logs.md"
@@ -118,3 +124,70 @@ def test_a_joystick_of_bytes_that_is_often_at_its_end_is_none_from_0_to_100() ->
     likely = likely_range(np.round(127 + 1.27 * STEPS))
     assert likely is not None
     assert likely.name == "bytes around 127"
+
+
+NOISE = np.round(np.random.default_rng(1).normal(0, 2, len(STEPS)))
+
+
+@pytest.mark.parametrize(
+    ("counts", "name", "rest"),
+    [
+        (2047 + 20.47 * STEPS, "0 to 4095", 2047),
+        (2047 + 20.47 * STEPS.clip(0), "0 to 4095", 2047),
+        (2347 + 17 * STEPS, "0 to 4095", 2347),
+        (2130 + 0 * STEPS, "0 to 4095", 2130),
+        (9 * STEPS, "±1000", 0),
+        (18 * STEPS, "±2047", 0),
+        (31000 + 150 * STEPS, "0 to 65535", 31000),
+    ],
+)
+def test_noisy_counts_have_the_range_in_which_they_rest(
+    counts: np.ndarray, name: str, rest: float
+) -> None:
+    """Whether they are given on both sides, on one, or never."""
+    values = np.round(counts) + NOISE
+    likely = likely_range(values)
+    assert likely is not None
+    assert likely.name == name
+    _, around = resting_range(values, likely, None) or (0.0, likely)
+    assert abs(around.scale * rest + around.offset) < 0.1
+
+
+def test_counts_around_0_of_one_log_have_one_scale(tmp_path: Path) -> None:
+    """`init` and `check` alike."""
+    path = tmp_path / "log.csv"
+    joints = ["boom", "stick"]
+    names = ["time_s", *(f"cmd_{n}" for n in joints), *(f"angle_{n}" for n in joints)]
+    columns = [T, 18 * STEPS, 9 * STEPS, 20 * np.sin(0.4 * T), 20 * np.cos(0.3 * T)]
+    header = ",".join(names)
+    np.savetxt(path, np.stack(columns, 1), delimiter=",", header=header, comments="")
+    guess = guess_columns([open_table(path)], joints)
+    settings = LogSettings.model_validate(guess.log)
+    for joint in (1, 2):
+        command = settings.columns("command", joint)
+        assert command is not None
+        assert command.scale == pytest.approx(100 / 2047)
+        guess.log["joints"][joint]["command"].pop("scale")
+    settings = LogSettings.model_validate(guess.log)
+    ranges = dict.fromkeys(joints, (-np.inf, np.inf))
+    _, findings = check_parts(path, settings, ranges)
+    hints = [one.hint for one in findings if one.level == "error"]
+    assert len(hints) == 2
+    assert all("in ±2047" in hint for hint in hints)
+
+
+def test_a_command_that_is_never_near_0_tells_no_range(tmp_path: Path) -> None:
+    """Of one that tells it the others have theirs, and rest where they begin."""
+    path = tmp_path / "log.csv"
+    joints = ["swing", "boom", "stick"]
+    names = ["time_s", *(f"cmd_{n}" for n in joints), *(f"angle_{n}" for n in joints)]
+    duty = [7.47 + 0.025 * STEPS, 6.9 + 0.005 * STEPS, 0 * STEPS + 7.6]
+    columns = [T, *duty, *(20 * np.sin(k * T) for k in (0.2, 0.3, 0.4))]
+    header = ",".join(names)
+    np.savetxt(path, np.stack(columns, 1), delimiter=",", header=header, comments="")
+    settings = LogSettings.model_validate(guess_columns([open_table(path)], joints).log)
+    for joint, cell in enumerate((7.47, 6.9, 7.6), 1):
+        command = settings.columns("command", joint)
+        assert command is not None
+        assert command.scale == pytest.approx(40, rel=0.05)
+        assert command.scale * cell + command.offset == pytest.approx(0, abs=0.01)

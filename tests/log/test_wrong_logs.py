@@ -287,7 +287,7 @@ WRONG = (
     ),
     Wrong(
         "a sensor that freezes",
-        "warning: last digit",
+        "warning: is frozen",
         lambda: of("q1", frozen, dig()),
         config=EXCAVATED,
     ),

@@ -18,6 +18,7 @@ from field_logs import (
 )
 
 import hydroid
+from hydroid.errors import LogError
 from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
 
@@ -109,3 +110,26 @@ def test_rows_without_a_signal_are_left_out(arm: Arm, tmp_path: Path) -> None:
         str(line) for line in hydroid.check(tmp_path / "log.csv", config=config).lines
     ]
     assert any("a lost signal" in line and "29 more" in line for line in lines)
+
+
+def test_a_joint_whose_sensor_has_failed_is_left_out_and_not_fitted(
+    tmp_path: Path,
+) -> None:
+    """Among logs of which another one shows its motion it may be."""
+    columns = table(make_truth((70, -60, 100)))
+    good, dead = tmp_path / "good.csv", tmp_path / "dead.csv"
+    good.write_text(text(columns))
+    columns["boom_angle_deg"] = np.full_like(columns["time_s"], 15.0)
+    dead.write_text(text(columns))
+    made = hydroid.init(tmp_path / "dead", log=dead).result
+    assert any("boom: driven, but the angle never" in one for one in made.columns)
+    settings = hydroid.load_settings(tmp_path / "dead" / "fit.yaml")
+    assert settings.outputs == (2,)
+    assert settings.log.columns("command", 1) is None
+    assert hydroid.check(dead, config=settings).exit_status == 0
+    hydroid.init(tmp_path / "good", log=good)
+    settings = hydroid.load_settings(tmp_path / "good" / "fit.yaml")
+    assert hydroid.check(dead, config=settings).exit_status == 2
+    assert hydroid.check([good, dead], config=settings).exit_status == 0
+    with pytest.raises(LogError, match="boom is driven and compared, but the angle"):
+        hydroid.fit(settings, dead)

@@ -29,6 +29,7 @@ from hydroid.reporting.figure import figure, saved, style
 from hydroid.reporting.parameters_report import direction_word, prior_chart, short_table
 from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.search_report import search_section, starts
+from hydroid.settings.problem import ParameterSettings
 
 PROBLEM = make_problem(outputs=(2, 3), samples=400)
 FIT = make_fit(PROBLEM, effects=(1e-3, 1e-3, 0.0, 1e-3))
@@ -84,6 +85,40 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     assert (
         speed_section(SETTINGS, SUMMARY.changed({"curves": {}}), PROBLEM.logs) is None
     )
+
+
+def test_the_valve_s_dead_bands_stand_beside_its_heading():
+    """Of the settings where the fit has none, and without what a group adds to them."""
+    curves = dict(SUMMARY.curves)
+    for joint in ("shoulder", "elbow"):
+        curves[f"{joint}_opening"] = curves[f"{joint}_speed"]
+    bands = {"a_late": -3.0, "a": 12.0, "b": 8.5}
+    parameters = {
+        "a_late": {"quantity": "dead_band_a", "per": "late", "sd": 2.0},
+        "a": {"quantity": "dead_band_a", "bounds": (0.0, 50.0)},
+        "b": {"quantity": "dead_band_b", "fixed": 8.5},
+    }
+    settings = SETTINGS.changed({"hydraulics.dead_band_b": 5.0}).with_parameters(
+        {
+            name: ParameterSettings.model_validate(stated | {"joints": [2]})
+            for name, stated in parameters.items()
+        }
+    )
+    one = SUMMARY.estimate["K"]
+    estimate = {name: one.changed({"value": value}) for name, value in bands.items()}
+    summary = SUMMARY.changed({"curves": curves, "estimate": estimate})
+    section = speed_section(settings, summary, PROBLEM.logs)
+    assert section is not None
+    assert section.title.startswith("Valve: dead band")
+    said = "dead band: shoulder +12 and −8.5 % and elbow +0 and −5 % (fixed); fastest: "
+    assert section.answer.startswith(said)
+    stated = SUMMARY.quantities["shoulder_dead_band"].changed({"value": 15.0})
+    quantities = {"shoulder_dead_band_positive": stated}
+    section = speed_section(
+        settings, summary.changed({"quantities": quantities}), PROBLEM.logs
+    )
+    assert section is not None
+    assert section.answer.startswith("dead band: shoulder +15 and −8.5 % and elbow")
 
 
 def test_step_and_frequency_response_stand_where_a_fit_states_them():

@@ -184,6 +184,28 @@ def test_what_cannot_go_on_stays_at_its_start_and_says_why(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_beside_an_edge_the_other_parameters_move_on(seed):
+    """As where a machine leaves its stop a little later, and is then far off: what
+    decides that has little effect else, and damping by effect hardly holds it."""
+    rng = np.random.default_rng(seed)
+    truth = rng.uniform(0.3, 0.7, 5)
+    effect = np.array([1, 1, 0.01, 1, 1])
+    of_effects, matrix = linear(np.geomspace(1, 0.1, 5), np.zeros(5), seed=seed)
+    begun = np.clip(truth + rng.uniform(-0.2, 0.2, 5), 0, 1)
+    begun[2] = truth[2] - 0.2
+    edge = begun[2] + 1e-4
+
+    def residuals(x):
+        return np.where(x[:, 2:3] > edge, 1e3, of_effects((x - truth) * effect))
+
+    result = least_squares(begun, residuals, SETTINGS)
+    # the best of all points up to the edge lies on it
+    curvature = np.linalg.inv((matrix * effect).T @ (matrix * effect))[2, 2]
+    least = 0.5 * (truth[2] - edge) ** 2 / curvature
+    assert result.cost < 1.001 * least
+
+
 def test_iterations_run_out():
     result = least_squares(
         np.array([0.1, 0.9]), rosenbrock, RefinementSettings(iterations=2)

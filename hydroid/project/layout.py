@@ -144,27 +144,23 @@ def _seen(
     else:
         settings, logs = _mirrored(table, arm, guess, others, reasons, progress)
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
+    driven = _with_command(entries, measured)
     left_out = list[Path]()
     reach = dict[int, tuple[float, float]]()
+    motions = dict[int, JointMotion]()
     if logs:
         fitted, unseen, left_out = read_others(
             table, settings, arm, others, reasons, progress
         )
         logs += fitted
         reach = reach_of([*logs, *unseen], measured)
-    driven = [joint for joint in measured if entries[joint]["command"] is not None]
-    motions = dict[int, JointMotion]()
-    if logs:
         motions = {joint: motion_of(logs[0], joint) for joint in measured}
         _refuse_rest(table, driven, logs, arm.joint_names)
         driven = _driven(driven, logs, arm.joint_names, reasons)
     wrong = _turn_commands(entries, motions, arm, reasons)
     reasons += _lacking(entries, arm.joint_names)
     if origin == GUESSED:
-        for joint in measured:
-            # a guessed valve would swing a joint of which nothing is known
-            if stands_still(logs, joint):
-                entries[joint]["command"] = None
+        _forget_standing(entries, measured, logs)
     undriven = [motion for joint, motion in motions.items() if joint not in driven]
     return Layout(
         guess.log,
@@ -178,6 +174,20 @@ def _seen(
         reach=reach,
         origin=origin,
     )
+
+
+def _with_command(entries: Mapping[int, Plain], joints: Sequence[int]) -> list[int]:
+    return [joint for joint in joints if entries[joint]["command"] is not None]
+
+
+def _forget_standing(
+    entries: dict[int, Plain], joints: Sequence[int], logs: Sequence[Log]
+) -> None:
+    """Leave out the commands of joints that stand still: a guessed valve would swing a
+    joint of which nothing is known."""
+    for joint in joints:
+        if stands_still(logs, joint):
+            entries[joint]["command"] = None
 
 
 def _mirrored(

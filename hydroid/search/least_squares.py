@@ -36,7 +36,7 @@ What else differs from a textbook:
 """
 
 from dataclasses import replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -77,6 +77,13 @@ EXACT = 1e-24
 """part of the first cost at which nothing is left to explain"""
 SLOW_STEPS = 2
 """steps in a row that may gain less than the tolerance"""
+
+
+class _Try(NamedTuple):
+    """A step, and the parameter that it holds, if any."""
+
+    step: Array
+    held: int = NONE
 
 
 def least_squares(
@@ -130,17 +137,10 @@ def _differentiate(
 def _advance(now: State, residuals: Function, settings: RefinementSettings) -> State:
     """Try a step, or several; take the best one if it helps."""
     model = LinearModel(now)
-    first = model.step(now.damping)
-    steps = [first]
-    if now.fresh and np.linalg.norm(first) > SHORTEST:
-        corrected = _corrected(now, model, first, residuals)
-        if corrected is not None:
-            steps.append(corrected)
-    is_held = now.held != NONE
-    if is_held:
-        steps.append(model.step(now.damping, held=now.held))
+    tried = _tried(now, model, residuals)
+    first = tried[0].step
     # inside the box, so that a step may be shorter than it was solved for
-    points = np.array([model.reach(s) for s in steps])
+    points = np.array([model.reach(one.step) for one in tried])
     moved = np.linalg.norm(points[0] - now.point)
     if moved <= SHORTEST * np.linalg.norm(now.point):
         return _no_step(now)
@@ -150,19 +150,32 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
     best = np.argmin(cost)
     if not cost[best] < now.cost:
         return _without_gain(now, model, residuals, settings)
+    taken = tried[best]
     promised = model.gain(first)
-    held = NONE
-    if is_held and best == len(steps) - 1:
-        promised = model.gain(steps[best])
-        held = now.held
+    if taken.held != NONE:
+        promised = model.gain(taken.step)
     ratio = 0.0
     if promised > 0:
         ratio = (now.cost - cost[best]) / promised
     after = _moved(now, points[best], rows[best], ratio, settings)
-    after = replace(after, held=held)
+    after = replace(after, held=taken.held)
     if after.ended or not _keeps_jacobian(now, after, ratio):
         return after
     return replace(after, jacobian=_updated(now, after))
+
+
+def _tried(now: Descent, model: LinearModel, residuals: Function) -> list[_Try]:
+    """Return the steps that are tried: the damped one, where the Jacobian is new its
+    correction, and where the last step held a parameter one that holds it too."""
+    first = model.step(now.damping)
+    tried = [_Try(first)]
+    if now.fresh and np.linalg.norm(first) > SHORTEST:
+        corrected = _corrected(now, model, first, residuals)
+        if corrected is not None:
+            tried.append(_Try(corrected))
+    if now.held != NONE:
+        tried.append(_Try(model.step(now.damping, held=now.held), now.held))
+    return tried
 
 
 def _corrected(

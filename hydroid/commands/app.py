@@ -35,7 +35,7 @@ GROUPS = {
     "Fit parameters to logs": {
         "fit-mech": "stage 1: gain, damping, stiffness, masses",
         "fit-hyd": "stage 2: the hydraulic actuators",
-        "adapt": "move a fit to new logs by a few parameters",
+        "adapt": "refit a few parameters to new logs",
     },
     "Judge a fit": {
         "validate": "test fits on other logs",

@@ -46,12 +46,12 @@ def export(
 ) -> Result[list[str]]:
     """Write a fitted machine for other programs.
 
-    parameters: draws of all parameters that agree with the logs, ranges of the
-    parameters, and errors of the model. table: steady speed of each joint against its command,
-    as CSV for a PLC. urdf: your own file with the masses of the fit. mjcf: a model that
-    plain MuJoCo steps. linear: A, B, C, D and delays near one pose and
-    command, as JSON, and a page with step response and Bode plot. fmu: FMI 2 for
-    co-simulation.
+    parameters: random sets of all parameters (draws) with which the model agrees with
+    the logs, ranges of the parameters, and errors of the model. table: steady speed of
+    each joint against its command, as CSV for a PLC. urdf: your own file with the
+    masses of the fit. mjcf: a model that plain MuJoCo steps. linear: A, B, C, D and
+    delays near one pose and command, as JSON, and a page with step response and Bode
+    plot. fmu: FMI 2 for co-simulation.
 
     Example: hydroid export runs/hyd --to parameters --draws 100
 
@@ -60,7 +60,8 @@ def export(
     Args:
         fit (RUN|YAML): A fit: its run folder, or a plant saved in Python.
         to (KIND): parameters, table, urdf, mjcf, linear or fmu.
-        out (DIR): Folder of the files [default: runs/export; in Python: none].
+        out (DIR): Folder of the files [default: runs/export; in Python nothing is
+            written].
         draws (1 to 100000): Number of draws of the parameters.
         robot (URDF): With --to urdf: your robot's URDF, whose masses are replaced.
         pose (NAME): The pose where the plant starts, by its name in the arm's file

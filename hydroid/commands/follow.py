@@ -62,8 +62,10 @@ def follow(
             angles of the fit's first log, or in the pose of --set start_pose=NAME.
         out (LOG.csv): The commands and the angles asked for, in the columns and units
             of the fit's logs; the page has the same name [default:
-            runs/follow/commands.csv; in Python: none].
+            runs/follow/commands.csv; in Python nothing is written].
         payload (0 or more): Mass at the tip [kg].
+        repair: Fill gaps in the joint angles of the trajectory up to log.repair_s
+            (0.1 s). The file stays as it is.
 
     Raises:
         LogError: the trajectory cannot be used, or moves a joint that takes no

@@ -43,12 +43,13 @@ def init(
         print(*project.notes, *project.columns, *project.commands, sep="\\n")
 
     Args:
-        folder (DIR): Folder of the project, new or not [default: that of --config].
+        folder (DIR): Folder of the project, new or not [default: the folder
+            of the file --config].
         arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a
             template of boxes].
         log (LOG): A log; its columns are guessed. Repeat the option for several logs.
-            The commands to run next then fit all logs but the last, and validate on
-            that one.
+            The last of several is kept: the commands that init prints
+            fit the others, and validate on this one.
         config (YAML): The fit.yaml of an earlier init, whose `log` section you have
             completed. Its columns and its arm stay; all other settings are written
             anew.

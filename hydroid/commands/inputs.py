@@ -42,7 +42,8 @@ SHARED = f"""
     log (LOG): A log. Formats: {FORMATS}.
     fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a plant saved in Python,
         or a YAML file of parameter values.
-    out (DIR): Folder for the tables [default: runs/COMMAND; in Python: none].
+    out (DIR): Folder for the tables [default: runs/COMMAND; in Python nothing is
+        written].
     config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine.
         For the shipped arm: the name of a shipped config.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
@@ -57,7 +58,8 @@ SHARED = f"""
     pose (NAME): The start pose, by its name in the arm's file [default: the first angles of the
         log].
 
-    algorithm (NAME): Search: ga, nsga2, multistart or pymoo (search.pymoo).
+    algorithm (NAME): Search: ga or nsga2 (genetic algorithms), multistart (least squares from
+        several starts), or pymoo (the algorithm of that package that search.pymoo.algorithm names).
     start (RUN|YAML): Start the search from the values of a fit.
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.

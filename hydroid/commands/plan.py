@@ -57,8 +57,9 @@ def suggest(
 ) -> "Result[tuple[Finding, ...]]":
     """Find what the model lacks, and what to do next.
 
-    First it tests every parameter that the fit keeps fixed, switched off or shared,
-    such as a delay or dry friction. It frees the most promising ones, and judges them
+    First it tests every parameter that the fit keeps fixed or switched off, such as a
+    delay or dry friction, and every one that both directions of a joint, or several
+    joints, have in common. It frees the most promising ones, and judges them
     by the error on parts of the logs that are left out. Then it tests whether an
     angle of the logs has the wrong sign. Last it lists actions, from weighing a link to a
     new experiment, and how much each would reduce the uncertainty.

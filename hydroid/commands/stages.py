@@ -65,7 +65,8 @@ def fit_mech(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default: runs/fit-mech; in Python: none].
+        out (DIR): Run folder [default: runs/fit-mech; in Python nothing is
+            written].
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -106,12 +107,11 @@ def fit_hyd(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> FitResult:
-    """Estimate the hydraulic actuators (stage 2); the arm's parameters come from stage
-    1.
+    """Estimate the hydraulic actuators (stage 2).
 
-    By default it estimates piston areas, valve openings, onsets, delay and damping. The
-    config can free more, such as the amplifier's currents and the solenoid. Writes a
-    run folder as fit-mech does.
+    By default it estimates piston areas, valve openings, onsets (the voltages at the
+    smallest commands), delay, damping and friction. The config can free more, such as
+    the amplifier's currents and the solenoid. Writes a run folder as fit-mech does.
 
     Example: hydroid fit-hyd LOG.csv --config mine/fit.yaml --out runs/hyd
 
@@ -119,10 +119,12 @@ def fit_hyd(
         print(fitted.summary.values)
 
     Args:
-        out (DIR): Run folder [default: runs/fit-hyd; in Python: none].
+        out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is
+            written].
         mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values. The
-            masses are fixed at these values [default: the settings free the masses, or
-            the arm's file gives them].
+            masses are fixed at these values. Without it, masses that are parameters of
+            the settings are estimated too, unless they are fixed there. All others are
+            those of the arm's file.
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -347,12 +349,12 @@ def adapt(
 
     Use it after a change of the machine: a slower engine, a colder day, another tool.
     For a load of known mass, set the payload of the logs instead: --set
-    'payloads={LOADED.csv: 250}'. For a load that nobody has
-    weighed, free tip_load. To judge a parameter, hydroid leaves parts of the logs out of
-    the fit and predicts them. The parameter stays free only if that lowers their error.
-    The result is a run that every command takes.
+    'payloads={LOADED.csv: 250}'. For a load that nobody has weighed, free tip_load.
+    Without --free, hydroid tries parameters one by one. It leaves parts of the logs out
+    of the fit and predicts them. A parameter stays free only if that lowers the error
+    there. The result is a run that every command takes.
 
-    Example: hydroid adapt LOADED.csv --fit runs/hyd --free P_flow
+    Example: hydroid adapt SLOW.csv --fit runs/hyd --free P_flow
 
         adapted = hydroid.adapt("b.csv", fit="runs/a", free="M3")
         print(adapted.summary.values)
@@ -360,8 +362,9 @@ def adapt(
     Args:
         logs (LOG): The new logs.
         free (NAME,NAME): Parameters to free [default: those that help, among masses,
-            pump, tip_load and the effects of days or other groups of logs].
-        out (DIR): Run folder [default: runs/adapt; in Python: none].
+            pump, tip_load and the effects of groups of logs, such as those of a day
+            (log.groups)].
+        out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.
 

@@ -63,10 +63,10 @@ def validate(
         print(validated.result[0]["shoulder"].rms)  # [deg]
 
     Args:
-        fit (RUN|YAML): An estimate: the folder of a run or of Plant.save (Python), or a
-            YAML file. Repeat the option to compare several.
-        tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. To
-            give each joint its own, set tolerance_deg in config.yaml [default: the
+        fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a plant saved in Python,
+            or a YAML file of parameter values. Repeat the option to compare several.
+        tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. For
+            one of each joint: --set 'tolerance_deg={boom: 2, arm: 1}' [default: the
             fit's, or else 2 % of a joint's travel].
         apart: These logs were recorded under other conditions, such as another load.
             The fit's report shows them, but its verdict does not count them. Repeat

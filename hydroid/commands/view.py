@@ -71,7 +71,8 @@ def simulate(
         config (YAML): Settings; not needed if --fit is a run folder, which has its own.
         commands (COMMANDS.csv): A log of commands. Its angles before the first command
             give the start pose.
-        out (LOG.csv): The log to write [default: runs/simulated.csv; in Python: none].
+        out (LOG.csv): The log to write [default: runs/simulated.csv; in Python
+            nothing is written].
         noise_deg (0 to 90): Standard deviation of Gaussian noise on the angles [deg].
 
     Raises:

@@ -27,8 +27,8 @@ _MOTION = (
     "The picture begins where they differ most."
 )
 _NOTE = (
-    "error: rms between wished and predicted angle. with its band: 95 % of the machines that the logs allow "
-    "stay within this rms error, without any feedback. saturated: part of the time at full command."
+    "error: rms between wished and predicted angle. with its band: with 95 % probability the machine "
+    "stays within this rms error, without any feedback. saturated: part of the time at full command."
 )
 
 

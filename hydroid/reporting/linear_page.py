@@ -35,7 +35,7 @@ def linear_page(linear: LinearArm, drawn: Sequence[LinearArm], arm: Arm) -> Page
         tabs.append(Plot(f"linear_{k + 1}", caption, draw, button=name))
     band = ""
     if drawn:
-        band = f" Bands: 95 % of {len(drawn)} machines that the logs allow."
+        band = f" Bands: 95 % of {len(drawn)} machines that agree with the logs."
     section = Section("Step response and Bode plot", _TEXT + band, tabs=tuple(tabs))
     table = _about(linear, arm)
     near = Section(table.title, tables={"about": table})

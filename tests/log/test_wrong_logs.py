@@ -245,7 +245,7 @@ WRONG = (
     ),
     Wrong(
         "the same at a joint that turns to negative angles",
-        "warning: moves with its command",
+        "warning: at positive commands",
         lambda: of("u1", np.negative, dig()),
         config=EXCAVATED,
     ),

@@ -133,8 +133,8 @@ class CurveEstimate(Settings):
     step: float | None = None
     """command [%] whose step it answers; null: it answers none"""
     moves: str = ""
-    """what that command does with the joint's weight, raising or lowering; empty where
-    it does neither"""
+    """what that command does with the joint's weight, raising or lowering, or with a
+    joint that slides, extending or retracting; empty where it does neither"""
 
 
 def _finding(value: Any) -> Any:

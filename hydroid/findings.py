@@ -65,3 +65,19 @@ WORDS = {
     kind: (statement, " ".join(hint)) for kind, (statement, *hint) in _TABLE.items()
 }
 """statement and hint by kind; a hint may be empty"""
+
+OF_ENDING = frozenset(
+    ("not refined", "time up", "not converged", "not converged from its start")
+)
+"""kinds that say why an estimate need not be an optimum"""
+OF_OPTIMUM = frozenset(
+    (
+        "strained prior",
+        "at bound",
+        "several optima",
+        "behind nine numbers",
+        "behind nine numbers from its start",
+        "error lasts",
+    )
+)
+"""kinds whose advice holds only of an estimate that has converged"""

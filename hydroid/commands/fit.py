@@ -13,6 +13,7 @@ from hydroid.commands.inputs import LogSource, LogSources, ModelSource, Source
 from hydroid.commands.logs import earlier_logs, read_log, read_logs, refuse_unfit
 from hydroid.errors import LogError, RunError, SettingsError
 from hydroid.estimate import NAME, FitSummary
+from hydroid.findings import OF_OPTIMUM
 from hydroid.identified_model import IdentifiedModel
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import OTHER, log_file
@@ -194,11 +195,13 @@ def fit(
         )
     problem = Problem(settings, read, workers)
     if folder is None:
-        return _result(problem, run_fit(problem, progress), None)
+        return fit_result(problem, run_fit(problem, progress), None)
     with folder.owned():
         log_start()
         checkpoints = folder.begin(problem.settings, problem.logs)
-        result = _result(problem, run_fit(problem, progress, checkpoints), folder.path)
+        result = fit_result(
+            problem, run_fit(problem, progress, checkpoints), folder.path
+        )
         _store(folder, result)
     return result
 
@@ -244,7 +247,9 @@ def _refuse_empty_groups(settings: FitSettings, files: Sequence[Path]) -> None:
             )
 
 
-def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
+def fit_result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
+    """Return a finished fit with its account and its verdict; `folder` is that of its
+    run, where it has one."""
     from hydroid.advice.assumptions import assumption_findings, doubts
     from hydroid.fitting.summary import summarise
     from hydroid.fitting.validation import fitted
@@ -253,6 +258,7 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     from hydroid.reporting.parameters_report import parameter_table, sentence
     from hydroid.reporting.verdict_table import next_lines, next_step, verdict_lines
     from hydroid.run.record import fit_record
+    from hydroid.search.descent import Ending
 
     settings = fit.problem.settings
     predictions = fitted(fit)
@@ -266,18 +272,23 @@ def _result(problem: "Problem", fit: "Fit", folder: Path | None) -> FitResult:
     ]
     # after the first, which may be that time was up
     findings[1:1] = behind(settings, verdict)
+    # one whose time was up may be far from its optimum
+    if summary.ending == Ending.TIME.value:
+        findings = [one for one in findings if one.kind not in OF_OPTIMUM]
     summary = summary.changed({"verdict": verdict, "findings": tuple(findings)})
     source = "the fit" if folder is None else str(folder / NAME)
     lines: list[Table | str] = verdict_lines({fit.final: verdict})
-    lines += [sentence(finding, settings) for finding in warnings(summary)]
+    # of a run the next step says that time was up, and how to go on
+    said = [w for w in warnings(summary) if folder is None or w.kind != "time up"]
+    lines += [sentence(finding, settings) for finding in said]
     if folder is not None:
         step = next_step(summary, verdict, str(folder), predictions)
         lines += [*next_lines(step), str(folder / "report.html")]
-    said = [sentence(finding, settings) for finding in summary.findings]
+    details = [sentence(finding, settings) for finding in summary.findings]
     return FitResult(
         lines=lines,
         content=summary.plain() | {"out": folder and str(folder)},
-        details=[parameter_table(settings, summary), *said],
+        details=[parameter_table(settings, summary), *details],
         problem=problem,
         fit=fit,
         folder=folder,

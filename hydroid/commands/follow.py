@@ -1,6 +1,7 @@
 """`hydroid follow`: commands that lead the arm along angles over time."""
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +18,10 @@ from hydroid.commands.inputs import (
 from hydroid.commands.logs import read_arms
 from hydroid.errors import SettingsError
 from hydroid.files import is_file
+from hydroid.findings import OF_ENDING, Finding
+from hydroid.joint_verdict import JointVerdict, Verdict
 from hydroid.log import Log, open_table, write_log
-from hydroid.words import plain
+from hydroid.words import listed, plain, two_digits
 
 if TYPE_CHECKING:
     from hydroid.arrays import Array
@@ -94,7 +97,13 @@ def follow(
     followed = find_commands(model, path, payload=payload)
     arm = model.settings.arm
     name = "commands" if out is None else Path(out).stem
-    said = [*missed_lines(followed, arm), *_path_lines(followed, tip)]
+    verdicts = _verdicts(model)
+    doubts = _doubts(followed, model, verdicts)
+    said = [
+        *map(str, doubts),
+        *missed_lines(followed, arm),
+        *_path_lines(followed, tip, verdicts),
+    ]
     page = follow_page(name, followed, arm, said)
     lines: list[Table | str] = [tracking_table(followed, arm), *said]
     if out is not None:
@@ -105,6 +114,7 @@ def follow(
         "lead_s": followed.lead_s,
         "tip": tip and tip.tip.what,
         "tip_away_mm": tip and _away(tip, followed),
+        "findings": [asdict(doubt) for doubt in doubts],
         "joints": [_errors(followed, joint, arm) for joint in followed.joints],
         "missed": [
             {**vars(missed), "joint": arm.joint_names[missed.joint]}
@@ -114,8 +124,13 @@ def follow(
     return Result(lines, content, followed, page)
 
 
-def _path_lines(followed: "Followed", tip: "TipKinematics | None") -> list[str]:
-    """Return what is said of the tip's path, and of when the path begins."""
+def _path_lines(
+    followed: "Followed",
+    tip: "TipKinematics | None",
+    verdicts: Mapping[int, JointVerdict],
+) -> list[str]:
+    """Return what is said of the tip's path, of the errors to expect, and of when the
+    path begins."""
     lines = list[str]()
     if tip is not None:
         from hydroid.use.tip_path import spelt
@@ -126,12 +141,103 @@ def _path_lines(followed: "Followed", tip: "TipKinematics | None") -> list[str]:
             f"The tip is {tip.tip.what}. It starts at {start}. By the model it stays "
             f"within {away:.3g} mm of the path."
         )
+    lines += _unseen_lines(followed, verdicts, tip)
     if followed.lead_s:
         lines.append(
             f"The path begins {plain(followed.lead_s)} s into the file: "
             "delay and lags need commands that early."
         )
     return lines
+
+
+def _verdicts(model: "IdentifiedModel") -> dict[int, JointVerdict]:
+    """Return what a fit is worth for each joint (number, from 1) that it compared, by
+    all unseen logs that its run holds."""
+    from hydroid.run.record import load_record, run_of
+
+    run = run_of(model)
+    verdicts = model.summarise().verdict if run is None else load_record(run).verdict
+    return {verdict.joint: verdict for verdict in verdicts}
+
+
+def _moved(followed: "Followed") -> list[int]:
+    """Return the joints that the path moves, numbered from 1."""
+    import numpy as np
+
+    return [j for j in followed.joints if np.ptp(followed.log.angle_of(j)) > 0]
+
+
+def _doubts(
+    followed: "Followed", model: "IdentifiedModel", verdicts: Mapping[int, JointVerdict]
+) -> list[Finding]:
+    """Return why the machine may miss the path by more than the model says: a fit that
+    has not converged, and joints that no unseen log shows it to predict."""
+    doubts = [one for one in model.summarise().findings if one.kind in OF_ENDING]
+    unproven = dict[str, str]()
+    for joint in _moved(followed):
+        verdict = verdicts.get(joint)
+        if verdict is None or verdict.verdict is not Verdict.PREDICTS:
+            name = model.settings.arm.name_of(joint)
+            unproven[name] = verdict.text if verdict else str(Verdict.UNTESTED)
+    if unproven:
+        kind = "path not proven"
+        doubts.append(Finding(kind, "warning", tuple(unproven), details=unproven))
+    return doubts
+
+
+def _unseen_lines(
+    followed: "Followed",
+    verdicts: Mapping[int, JointVerdict],
+    tip: "TipKinematics | None",
+) -> list[str]:
+    """Return by what the fit erred on unseen logs, over about as long as the path
+    lasts, and how far that leads the tip away; nothing without such logs."""
+    import numpy as np
+
+    moved = _moved(followed)
+    tested = [verdicts[joint] for joint in moved if joint in verdicts]
+    tested = [verdict for verdict in tested if verdict.unseen_deg is not None]
+    if not tested:
+        return []
+    over, errors = _unseen_errors(tested, followed)
+    by_joint = list[str]()
+    for verdict, error in zip(tested, errors, strict=True):
+        shown = verdict.shown
+        size = f"{two_digits(shown.of_degrees(error))} {shown.unit}"
+        by_joint.append(f"{size} ({verdict.name})")
+    line = f"On unseen logs the rms error {over} was {listed(by_joint)}"
+    if tip is not None and len(tested) == len(moved):
+        joints = [verdict.joint for verdict in tested]
+        off = _tip_off(
+            tip, followed, dict(zip(joints, np.radians(errors), strict=True))
+        )
+        line += f", which is up to {two_digits(off)} mm at the tip"
+    return [f"{line}."]
+
+
+def _unseen_errors(
+    verdicts: Sequence[JointVerdict], followed: "Followed"
+) -> tuple[str, list[float]]:
+    """Return rms errors [deg] of joints that unseen logs test, and in words when: after
+    the first of the prediction times that is no shorter than the path.
+
+    Over whole logs where no time is that long, or one of the joints has no error there.
+    """
+    from hydroid.fitting.validation import HORIZONS
+    from hydroid.fitting.verdict import THE_FIT
+
+    log = followed.log
+    seconds = log.time[-1] - log.time[0] - followed.lead_s
+    for i, horizon in enumerate(HORIZONS):
+        # a sample beside it is none
+        if horizon < seconds - log.period:
+            continue
+        ahead = [v.horizons_deg[THE_FIT][i] for v in verdicts if v.horizons_deg]
+        errors = [error for error in ahead if error is not None]
+        if len(errors) == len(verdicts):
+            return f"after {horizon:g} s", errors
+    errors = [v.unseen_deg for v in verdicts if v.unseen_deg is not None]
+    return "over whole logs", errors
 
 
 def _standing(model: "IdentifiedModel", given: "SettingChanges") -> "Array":
@@ -180,6 +286,25 @@ def _away(tip: "TipKinematics", followed: "Followed") -> float:
     for wanted, predicted in zip(followed.log.angle, followed.angle, strict=True):
         away = tip.place(predicted) - tip.place(wanted)
         farthest = max(farthest, float(np.linalg.norm(away)))
+    return 1e3 * farthest
+
+
+def _tip_off(
+    tip: "TipKinematics", followed: "Followed", errors: Mapping[int, float]
+) -> float:
+    """Return how far errors of joints [rad, m], independent of each other, lead the tip
+    away where they do so the most [mm]."""
+    import math
+
+    farthest = 0.0
+    for angle in followed.log.angle:
+        place = tip.place(angle)
+        ways = list[float]()
+        for joint, error in errors.items():
+            off = angle.copy()
+            off[joint - 1] += error
+            ways += (tip.place(off) - place).tolist()
+        farthest = max(farthest, math.hypot(*ways))
     return 1e3 * farthest
 
 

@@ -145,7 +145,10 @@ def _lines(project: "Project", *, guessed: bool) -> list[str]:
                 "The log's columns, guessed. Check them, and correct them in fit.yaml:"
             )
         picture = project.folder / "arm.png"
-        look = f"Next: look at {picture}, then (--budget 5min stops a fit at its best model):"
+        look = (
+            f"Next: look at {picture}, then (--budget 5min stops a fit at its best model "
+            "after 5 min on the clock; --resume gives it 5 more):"
+        )
     lines = [f"{project.folder}: {', '.join(project.files)}"]
     sections = {
         "The arm:": project.notes,

@@ -65,7 +65,8 @@ SHARED = f"""
     refinement: After the search, refine its estimate by least squares.
     budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. When it is
         up, hydroid keeps the best model so far. Intervals and report take some more
-        time. To go on, repeat the command with --resume.
+        time. To go on, repeat the command with --resume. The time is that of the clock,
+        and counts anew when a run is resumed.
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 

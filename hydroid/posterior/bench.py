@@ -41,8 +41,7 @@ class Direction(NamedTuple):
 
     @property
     def moves(self) -> str:
-        """What a command in it does with the joint's weight, raising or lowering; empty
-        where it does neither."""
+        """What a command in it does, as `CurveEstimate.moves` has it."""
         return "" if self.word == self.ending else self.word
 
     @property

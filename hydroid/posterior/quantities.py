@@ -184,14 +184,17 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
 
 
 def _directions(bench: Bench, estimate: Candidates) -> list[Direction]:
-    """Return both directions of a joint with the words that gravity gives them."""
+    """Return both directions of a joint with the words that gravity gives them, or of
+    one that slides its rod."""
     gravity = bench.weigh(estimate)[0][0]
     words = ("lowering", "raising")
-    if gravity * bench.sense > 0:
-        words = ("raising", "lowering")
-    # below 1 N·m no direction is called raising
-    if abs(gravity) < 1.0:
+    if bench.slides:
+        words = ("extending", "retracting")
+    elif abs(gravity) < 1.0:
+        # below 1 N·m no direction is called raising
         words = ("positive", "negative")
+    elif gravity * bench.sense > 0:
+        words = ("raising", "lowering")
     return [
         Direction(1.0, "positive", words[0]),
         Direction(-1.0, "negative", words[1]),

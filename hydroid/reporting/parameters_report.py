@@ -202,7 +202,7 @@ def _side_and_word(settings: FitSettings, name: str, summary: FitSummary) -> str
 
 
 def direction_word(summary: FitSummary, joint: str, towards: str) -> str:
-    """Return what a command of a sign does with a joint, `raising` or `lowering`;
+    """Return what a command of a sign does with a joint (`CurveEstimate.moves`);
     nothing where the fit does not say it."""
     step = summary.curves.get(f"{joint}_step_{towards}")
     return step.moves if step else ""

@@ -36,7 +36,8 @@ _TESTED = (
     "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: after predicting 1, "
     "5 and 10 s ahead, and over whole logs. In brackets: the error of the best simple "
     "model. Better, worse: than that model. Cannot be told: the difference may be chance; "
-    "more logs would show which model errs less."
+    "more logs would show which model errs less. Good up to: the tolerance of errors over "
+    "whole logs, by default 2 % of travel."
 )
 _NO_WORD = f" Whole logs are compared from {LEAST_BLOCKS} logs on."
 WHOLE = "whole logs"

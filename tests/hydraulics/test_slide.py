@@ -155,7 +155,7 @@ def test_its_flow_is_area_times_speed_and_its_pose_is_said_in_mm(
         for column, value in joint_measure(bench, estimate)(estimate)
     }
     area = TRUTH["area_A" if sign > 0 else "area_B"] * 1e-6
-    word = "raising" if sign > 0 else "lowering"
+    word = "extending" if sign > 0 else "retracting"
     name = settings.arm.joint_names[1]
     moves = f"when {word}: 100 % command, {name} at {bench.pose}"
     speed = found[f"speed {moves}"] * 1e-3

@@ -1,19 +1,23 @@
 """The numbers and words of a fit's tables are the fit's."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from linear_problem import ar1
 from report_fits import MODEL, make_fit, make_problem, make_record, make_uncertainty
 
+from hydroid.commands.fit import fit_result
 from hydroid.estimate import QuantityEstimate
-from hydroid.findings import Finding
+from hydroid.findings import OF_OPTIMUM, Finding
+from hydroid.fitting import verdict
 from hydroid.fitting.summary import summarise
 from hydroid.reporting.knowledge_report import error_section, every_quantity_section
 from hydroid.reporting.merged_report import merged_tables
 from hydroid.reporting.page import Table, log_names
 from hydroid.reporting.parameters_report import parameter_table
+from hydroid.search.descent import Ending
 
 FEWER = {name: bounds for name, bounds in MODEL.items() if name != "M2"}
 
@@ -208,3 +212,25 @@ def test_names_of_logs_are_different_short_and_printable(sources: list[str]):
     names = log_names(sources)
     assert len({*names.values()}) == len(sources)
     assert all(name.isprintable() and len(name) <= 50 for name in names.values())
+
+
+@pytest.mark.parametrize("ending", [Ending.ITERATIONS, Ending.TIME])
+def test_a_fit_whose_time_was_up_gives_no_advice_that_holds_only_of_an_optimum(
+    monkeypatch: pytest.MonkeyPatch, ending: Ending
+) -> None:
+    lagging = [Finding("behind nine numbers", "warning", ("shoulder",))]
+    monkeypatch.setattr(verdict, "behind", lambda *_: lagging)
+    problem = make_problem()
+    fit = make_fit(problem)
+    stopped = replace(fit.refinements["refined"], ending=ending)
+    fit = replace(fit, refinements={"refined": stopped}, ends={0: (1.0, 90.0)})
+    found = fit_result(problem, fit, Path("RUN"))
+    kinds = {finding.kind for finding in found.summary.findings}
+    is_up = ending is Ending.TIME
+    assert kinds.isdisjoint(OF_OPTIMUM) == is_up
+    assert {"behind nine numbers", "several optima"}.isdisjoint(kinds) == is_up
+    # the way on is said once
+    said = " ".join(map(str, found.lines))
+    assert said.count("--resume") == is_up
+    assert said.count("time was up") == is_up
+    assert "The time for the fit was up" not in said

@@ -250,6 +250,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "whole fitted logs": "1",
         "good up to": "1",
     }
+    assert "Good up to: the tolerance" in table.note
     assert lead({"a": [one]}).startswith(
         "boom: cannot be told from nine numbers (2 unseen logs)"
     )

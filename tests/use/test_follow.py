@@ -1,6 +1,8 @@
 """Commands along a path: played on the model they lead it there, and what cannot be had
 is said by name."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,9 @@ from made_models import EARLY, EARLY_SETTINGS, made_model
 
 import hydroid
 from hydroid.errors import HydroidError
+from hydroid.findings import Finding
 from hydroid.identified_model import IdentifiedModel
+from hydroid.joint_verdict import JointVerdict, Verdict
 from hydroid.log import Log, write_log
 from hydroid.plant import Limit, Plant
 from hydroid.use.follow import follow, joint_lags
@@ -226,3 +230,59 @@ def test_a_fit_of_stage_1_is_refused():
     mech = made_model(EARLY, stage="mech")
     with pytest.raises(HydroidError, match="stage 2"):
         hydroid.follow(path(model()), fit=mech)
+
+
+def judged(joint: int, name: str, verdict: Verdict, unseen: float | None = None):
+    """A verdict on a joint, by an unseen log where it has an error there [deg]."""
+    ahead = {"the fit": (0.1, 0.2, 0.3, 0.4, 0.5)} if unseen else {}
+    return JointVerdict(
+        joint=joint,
+        name=name,
+        verdict=verdict,
+        fitted_deg=0.1,
+        unseen_deg=unseen,
+        unseen_logs=1 if unseen else 0,
+        tolerance_deg=1.0,
+        horizons_deg=ahead,
+    )
+
+
+def fitted_model(*verdicts: JointVerdict, findings: Sequence[Finding] = ()):
+    return replace(
+        (one := model()),
+        summary=one.summarise().changed({"verdict": verdicts, "findings": findings}),
+    )
+
+
+def test_what_may_lead_the_machine_off_its_path_is_said_first():
+    """A joint that stands is no danger, and one that predicts no doubt."""
+    failing = judged(2, "shoulder", Verdict.WORSE_THAN_FITTED, 2.0)
+    one = fitted_model(
+        failing,
+        judged(3, "elbow", Verdict.UNTESTED),
+        findings=[Finding("time up", "warning"), Finding("error lasts", "note")],
+    )
+    found = hydroid.follow(path(one, seconds=3.0), fit=one)
+    stopped, unproven = map(str, found.lines[1:3])
+    assert stopped.startswith("The time for the fit was up before it had converged.")
+    assert "shoulder (predicts worse than it fits) and elbow (not tested)." in unproven
+    kinds = [finding["kind"] for finding in found.plain()["findings"]]
+    assert kinds == ["time up", "path not proven"]
+    proven = fitted_model(judged(2, "shoulder", Verdict.PREDICTS, 0.5))
+    alone = path(proven, seconds=3.0, joints={"shoulder": 1})
+    assert hydroid.follow(alone, fit=proven).plain()["findings"] == []
+    # of a model that no fit made, nothing is known
+    bare = model()
+    (said,) = hydroid.follow(path(bare, seconds=3.0), fit=bare).plain()["findings"]
+    assert said["details"] == {"shoulder": "not tested", "elbow": "not tested"}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "says"),
+    [(4.5, "after 5 s was 0.4 deg"), (12.0, "over whole logs was 2 deg")],
+)
+def test_the_error_on_unseen_logs_is_that_over_as_long_as_the_path(seconds, says):
+    one = fitted_model(judged(2, "shoulder", Verdict.ROUGHLY, 2.0))
+    wished = path(one, seconds=seconds, joints={"shoulder": 1})
+    lines = [str(line) for line in hydroid.follow(wished, fit=one).lines]
+    assert f"On unseen logs the rms error {says} (shoulder)." in lines

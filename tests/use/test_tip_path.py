@@ -1,5 +1,6 @@
 """A path of the tip becomes joint angles whose forward kinematics are the path."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -10,6 +11,7 @@ from made_models import EARLY, EARLY_SETTINGS, made_model
 import hydroid
 from hydroid.errors import LogError
 from hydroid.identified_model import IdentifiedModel, identified
+from hydroid.joint_verdict import JointVerdict, Verdict
 from hydroid.use.tip_path import TipKinematics
 
 
@@ -172,3 +174,34 @@ def test_a_path_that_cannot_be_followed_is_refused_in_one_line(
     with pytest.raises(LogError, match=says):
         hydroid.follow(file, fit=one, out=tmp_path / "commands.csv")
     assert not (tmp_path / "commands.csv").exists()
+
+
+def test_the_error_on_unseen_logs_is_told_where_the_tip_is(tmp_path: Path):
+    """An error of the shoulder alone leads the tip away along its circle."""
+    one = model()
+    error = 0.5
+    verdicts = [
+        JointVerdict(
+            joint=joint,
+            name=name,
+            verdict=Verdict.PREDICTS,
+            unseen_deg=size,
+            unseen_logs=1,
+            tolerance_deg=1.0,
+        )
+        for joint, name, size in [(2, "shoulder", error), (3, "elbow", 0.0)]
+    ]
+    known = replace(one, summary=one.summarise().changed({"verdict": verdicts}))
+    arm, start = one.settings.arm, one.settings.arm.pose("study")
+    wished = line(forward(arm, start), [0.03, 0.0, 0.05], seconds=6.0)
+    followed = hydroid.follow(write(tmp_path / "tip.csv", wished), fit=known)
+    off = []
+    for angle in followed.result.log.angle:
+        turned = angle.copy()
+        turned[1] += np.radians(error)
+        off.append(np.linalg.norm(forward(arm, turned) - forward(arm, angle)))
+    (said,) = [one for one in map(str, followed.lines) if "unseen logs" in one]
+    assert said == (
+        "On unseen logs the rms error over whole logs was 0.5 deg (shoulder) and 0 deg "
+        f"(elbow), which is up to {1e3 * max(off):.2g} mm at the tip."
+    )

@@ -9,6 +9,7 @@ from hydroid.arrays import Limits
 from hydroid.files import Plain
 from hydroid.log.columns import Column, Entry
 from hydroid.log.joint_columns import Assignment, Joints
+from hydroid.log.mapping import angle_margin
 from hydroid.log.rods import Rod
 from hydroid.log.uncalibrated import over_the_joint, over_the_range
 from hydroid.settings.log import LENGTHS
@@ -65,15 +66,14 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
     """
     slides = joint in arm.slides
     rod = arm.rods.get(joint)
-    limits = arm.ranges.get(joint)
-    if slides and not column.is_raw:
-        return _position(column)
     if rod is not None and not column.turns:
         length = _cylinder_length(column, rod, usual_unit)
         if length is not None:
             return length
-    if column.is_raw or _looks_like_counts(column, limits, usual_unit):
-        return over_the_joint(column, limits, slides=slides)
+    if column.is_raw or _looks_like_counts(column, joint, usual_unit, arm):
+        return over_the_joint(column, arm.ranges.get(joint), slides=slides)
+    if slides:
+        return _position(column)
     unit = column.unit
     hint = ""
     if not unit:
@@ -85,20 +85,29 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
 def _can_only_be_counts(
     column: Column, joint: int, angle_unit: str, arm: Joints
 ) -> bool:
-    """Return whether the column of a joint's angle holds counts, by its size, and no
-    length of its cylinder."""
-    if joint in arm.slides or column.is_raw:
+    """Return whether the column of a joint holds counts, by its size, and no length of
+    its cylinder."""
+    if column.is_raw:
         return False
     rod = arm.rods.get(joint)
     if rod and not column.turns and _cylinder_length(column, rod, angle_unit):
         return False
-    return _looks_like_counts(column, arm.ranges.get(joint), angle_unit)
+    return _looks_like_counts(column, joint, angle_unit, arm)
 
 
-def _looks_like_counts(column: Column, limits: Limits | None, angle_unit: str) -> bool:
+def _looks_like_counts(
+    column: Column, joint: int, angle_unit: str, arm: Joints
+) -> bool:
     """Return whether a column without a unit holds counts, by its size; a joint without
     limits may turn far."""
-    if column.unit or _may_be_angles(column, angle_unit):
+    limits = arm.ranges.get(joint)
+    if column.unit:
+        return False
+    if joint in arm.slides:
+        if limits is None or not column.is_of_a_sensor:
+            return False
+        return not _may_be_position(column, limits, angle_unit)
+    if _may_be_angles(column, angle_unit):
         return False
     return limits is not None or column.is_of_a_sensor
 
@@ -113,11 +122,30 @@ def _scaled(column: Column, unit: str) -> Plain:
 
 def _position(column: Column) -> Entry:
     """Return the settings of the column of a joint that slides."""
-    unit = column.unit
-    if not unit:
-        largest = float(np.nanmax(np.abs(column.values)))
-        unit = "mm" if largest > LARGEST_METRES else "m"
+    unit = column.unit or _usual_length(column)
     return Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
+
+
+def _usual_length(column: Column) -> str:
+    """Return the unit of positions that state none, by their size."""
+    largest = float(np.nanmax(np.abs(column.values)))
+    return "mm" if largest > LARGEST_METRES else "m"
+
+
+def _may_be_position(column: Column, limits: Limits, angle_unit: str) -> bool:
+    """Return whether a sensor's column without a unit may hold positions of a joint
+    that slides, by its range, or by its name where no other sensor counts."""
+    unit = _usual_length(column)
+    # no sensor gives as few counts
+    if unit == "m":
+        return True
+    least, most = limits
+    margin = angle_margin(least, most)
+    low, high = (UNITS[unit].factor * end for end in column.ends)
+    in_range = least - margin <= low and high <= most + margin
+    if angle_unit == COUNTS:
+        return in_range and column.is_length
+    return in_range or column.is_length
 
 
 def _may_be_angles(column: Column, unit: str) -> bool:

@@ -9,10 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.log.log import Log
+from hydroid.log.log import LEAST_COMMAND, Log
 
-LEAST_COMMAND = 2.0
-"""below which a command is none [%]"""
 ONE_SIZE = 5.0
 """commands of one size differ by less, from the tenth to the ninetieth percentile
 [%]"""

@@ -14,6 +14,10 @@ from hydroid.words import listed
 
 LONGEST_REST = 2.0
 """of which the start is the mean [s]"""
+LEAST_COMMAND = 2.0
+"""below which a command is none, but the noise of a lever [%]"""
+STANDS = 2e-3
+"""between the halves of a rest in which a joint stands its mean moves less [rad, m]"""
 LEVELS: tuple[Level, ...] = ("error", "warning", "note")
 
 
@@ -31,7 +35,7 @@ class Log:
         pressure: of chambers A and B [Pa], shape (T, J, 2), NaN where unmeasured; None:
             the log has none.
         rest: samples before the first command of the recording; None: before the first
-            one in `command`.
+            one in `command` (`first_command`).
         recorded: samples that stand in for a row of the file, shape (T,): angles of the
             others lie between two rows, and say nothing new. None: all do.
         pose: in which joints stand that are not measured [rad], shape (J,); None: it is
@@ -102,8 +106,37 @@ class Log:
 
     @property
     def first_command(self) -> int:
-        """Index of the first sample with a command; 0 where there is none."""
-        return int(np.argmax(np.any(self.command != 0, axis=1)))
+        """Index of the first sample with a command; 0 where there is none.
+
+        The noise of a lever is no command while all joints stand.
+        """
+        first = int(np.argmax(np.any(self.command != 0, axis=1)))
+        past_noise = self._first_past_noise(first)
+        return past_noise if self._stands_before(past_noise) else first
+
+    def _first_past_noise(self, first: int) -> int:
+        """Return the first sample of the commands that exceed the noise of a lever, or
+        else `first`."""
+        exceeds = np.abs(self.command) >= LEAST_COMMAND
+        begins = list[int]()
+        for joint in np.flatnonzero(exceeds.any(axis=0)):
+            reached = int(exceeds[:, joint].argmax())
+            sign = np.sign(self.command[: reached + 1, joint])
+            # a lever that is moved slowly leaves 0 earlier
+            before = np.flatnonzero(sign != sign[-1])
+            begins.append(int(before[-1]) + 1 if len(before) else 0)
+        return min(begins, default=first)
+
+    def _stands_before(self, sample: int) -> bool:
+        """Return whether the mean angles of both halves of the samples before one are
+        the same."""
+        half = sample // 2
+        if half == 0:
+            return False
+        earlier = self.angle[:half].mean(axis=0)
+        later = self.angle[half:sample].mean(axis=0)
+        # NaN, which is not larger than anything: not measured
+        return not np.any(np.abs(later - earlier) > STANDS)
 
     @property
     def start(self) -> Array:

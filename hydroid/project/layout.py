@@ -19,7 +19,7 @@ from hydroid.log import (
     stands_still,
 )
 from hydroid.log.clues import column_unit, kind_of
-from hydroid.log.command_sizes import LEAST_COMMAND
+from hydroid.log.log import LEAST_COMMAND
 from hydroid.log.mapping import angle_margin
 from hydroid.progress import Progress, no_progress
 from hydroid.project.columns import column_lines
@@ -360,10 +360,6 @@ def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
         _, against = motion.directed
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
-    moves = np.ptp(angle) > 0 and motion.log.drives(motion.joint)
-    if moves and motion.dead_band > 10:
-        below = f"below about {motion.dead_band:g} % of command"
-        yield f"{joint.name} hardly moves {below}: a dead band, or little opening"
 
 
 def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
@@ -379,7 +375,8 @@ def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
     allowed = f"{joint.range[0]:.6g} to {joint.range[1]:.6g}"
     yield (
         f"{joint.name}: {shown.word}s in the log run from {ends} {shown.setting}, but the arm "
-        f"allows {allowed}: give them an offset or a scale of -1, or change the range in arm.xml"
+        f"allows {allowed}: correct their scale (-1 if they count backwards) and offset, or the "
+        "range in arm.xml"
     )
 
 

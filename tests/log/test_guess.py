@@ -308,6 +308,49 @@ def test_sensors_of_which_one_counts_all_count(tmp_path: Path) -> None:
     assert (swing.unit, swing.scale) == ("deg", 1)
 
 
+@pytest.mark.parametrize(
+    ("name", "cells", "boom", "unit"),
+    [
+        ("telescope_pot_cnt", (600, 1700), (-20, 20), "m"),
+        ("telescope_pot", (1331, 3516), (-20, 20), "m"),
+        ("telescope_pot", (600, 1700), (766, 2934), "m"),
+        ("telescope_pot", (600, 1700), (-20, 20), "mm"),
+        ("telescope_pot", (0.6, 1.7), (766, 2934), "m"),
+        ("telescope_wire", (1331, 3516), (-20, 20), "mm"),
+        ("telescope_wire", (1331, 3516), (766, 2934), "m"),
+        ("telescope_pos", (1331, 3516), (766, 2934), "mm"),
+    ],
+)
+def test_a_sensor_of_a_slide_counts_as_one_of_a_turning_joint_does(
+    name: str, cells: tuple, boom: tuple, unit: str, tmp_path: Path
+) -> None:
+    """By its name, by its size, or as the others do; the boom's may hold degrees."""
+    columns = [T, STEPS, np.interp(SWEEP, [-20, 20], boom)]
+    columns += [STEPS, np.interp(SWEEP, [-20, 20], cells)]
+    np.savetxt(
+        tmp_path / "log.csv",
+        np.stack(columns, axis=1),
+        delimiter=",",
+        header=f"time_s,boom_cmd,boom_pot,telescope_cmd,{name}",
+        comments="",
+    )
+    found = guess_columns(
+        [open_table(tmp_path / "log.csv")],
+        ["boom", "telescope"],
+        slides=[2],
+        ranges={1: (-0.5, 1.0), 2: (0.0, 1.8)},
+    )
+    angle = found.log["joints"][2]["angle"]
+    assert angle["unit"] == unit
+    counts = "offset" in angle
+    assert counts == (f"{name}: {cells[0]} to {cells[1]} counts" in str(found.reasons))
+    if counts:
+        reached = angle["scale"] * np.array(cells) + angle["offset"]
+        np.testing.assert_allclose(reached, [0.0, 1.8], atol=1e-4)
+    else:
+        assert angle == {"column": name, "unit": unit}
+
+
 def test_a_command_that_is_never_0_has_its_rest_elsewhere(tmp_path: Path) -> None:
     columns = (T, 8 + 1.9 * np.sin(0.4 * T + 1), SWEEP)
     found = guess(tmp_path, ["time_s", "boom_cmd", "boom_deg"], *columns)

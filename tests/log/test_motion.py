@@ -74,6 +74,22 @@ def test_a_log_that_begins_with_a_command_starts_at_its_first_sample():
     assert np.array_equal(log.start, log.angle[0])
 
 
+@pytest.mark.parametrize(("drift", "rests"), [(0.0, True), (0.02, False)])
+def test_the_noise_of_a_lever_is_rest_while_the_arm_stands(drift: float, rests: bool):
+    """The lever then leaves 0 slowly: the arm rests until it does."""
+    log = steps([0.0, 50.0])
+    first = log.first_command
+    noise = np.random.default_rng(0).normal(0, 0.3, log.command.shape)
+    noise[first - 1] = 0.0
+    command = np.where(log.command == 0, noise, log.command)
+    command[first : first + 5, 1] = [0.4, 0.8, 1.2, 1.6, 2.0]
+    angle = log.angle + drift * log.time[:, None]
+    noisy_log = replace(log, command=command, angle=angle)
+    assert noisy_log.first_command == (first if rests else 0)
+    expected = log.start if rests else angle[0]
+    assert np.array_equal(noisy_log.start, expected)
+
+
 @pytest.mark.parametrize(("levels", "moves"), [([0.0, 50.0], 101), ([0.0] * 5, 300)])
 def test_rest_ends_with_the_first_command_or_after_two_seconds(
     levels: list[float], moves: int

@@ -417,7 +417,7 @@ ROWS = count(-99)
         (
             5,
             lambda q: q + 2,
-            r"boom_joint: angles .*allows -28\.6479 to 68\.7549: give them an offset",
+            r"boom_joint: angles .*allows -28\.6479 to 68\.7549: correct their scale",
             10,
         ),
         (

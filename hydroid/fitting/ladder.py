@@ -198,24 +198,11 @@ class Ladder:
     ) -> None:
         """Refine on a further rung, if it is better, and then with each of its terms
         besides; those of `lone` are another method's."""
-        if not self._shows(whole.settings, rung):
-            return
         possible = whole.settings.terms(rung)
         terms = tuple(term for term in possible if term in self._step.terms)
         self._rung(whole, Step(rung.name, terms), settings, if_better=True)
         if self._step.model == rung.name:
             self._add_terms(whole, rung, lone, settings)
-
-    def _shows(self, settings: FitSettings, rung: Rung) -> bool:
-        """Whether the logs show anything of what a further rung adds: a term of the
-        last rung that stands for it, as `oil` does for oil and inertia, was kept."""
-        possible = settings.terms(rung)
-        stand_ins = {
-            term
-            for term in settings.terms(self.problem.settings.rung)
-            if term not in possible
-        }
-        return not stand_ins or bool(stand_ins & {*self._step.terms})
 
     def _add_terms(
         self,

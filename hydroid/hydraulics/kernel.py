@@ -52,7 +52,7 @@ from hydroid.hydraulics.pump import (
     open_line,
 )
 from hydroid.hydraulics.records import LINE, SCRATCH
-from hydroid.hydraulics.valve import meter
+from hydroid.hydraulics.valve import faster, meter
 from hydroid.settings import linkage
 
 # means of t²/2 and t over a unit step: what a velocity error that grows from 0 to 1
@@ -166,6 +166,17 @@ def make_pad(joints: int) -> Pad:
         matrix=np.empty(square),
         gain=np.empty(joints),
     )
+
+
+@compilable
+def take_conditions(plugin: Plugin, pad: Pad, conditions) -> None:
+    """Let pump and valves of one candidate work as at an engine speed over its
+    reference, and in oil warmer than at its own [K], (2,)."""
+    engine = conditions[0]
+    pad.line[0].faster = engine - 1.0
+    for j in range(plugin.order.size):
+        c = plugin.coefficients[j]
+        pad.joints[j].faster = faster(c, engine, conditions[1])
 
 
 @compilable

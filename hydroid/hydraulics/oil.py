@@ -133,7 +133,7 @@ def store_oil(c, z, w, speed: float, angle: float, supply: float) -> None:
     a = c.a.area
     b = c.b.area
     tank = c.tank_pressure
-    edge = c.conductance * abs(w.open_area)
+    edge = c.conductance * (1.0 + w.faster) * abs(w.open_area)
     pressure_a = max(tank, (tank * b + w.push) / a)
     pressure_b = max(tank, (tank * a - w.push) / b)
     if speed != 0.0:

@@ -39,6 +39,10 @@ joints whose draws differ this is not f gᵀ: the predicted velocities err in th
 order of the sub-step, no oil is lost.) Where P would pass the relief pressure, or the
 limit of its fall, δ is what is missing to it.
 
+Q_max is stated at a reference of the engine speed. Where the log has the speed n, the
+pump turns with the engine, and φ above stands for φ n/n_ref. What runs past the valves
+is a matter of the pressure alone.
+
 dynamic         `draw_from_line` to `close_line`: P is integrated, V_line has a volume
 quasi-static    `line_pressure`: P satisfies Q_P(P) = Σ Q_i(P) at once, without V_line
 
@@ -121,7 +125,8 @@ def lowest(c) -> float:
 
 @compilable
 def come_up(line, c, step: float) -> float:
-    """Advance φ and the time of the demand by a sub-step [s]; the mean of φ."""
+    """Advance φ and the time of the demand by a sub-step [s]; the mean of φ, times the
+    engine speed over its reference."""
     before = line.share
     target = c.pump_idle
     if line.demanded > 0.0:
@@ -132,7 +137,7 @@ def come_up(line, c, step: float) -> float:
     else:
         line.demand = 0.0
     line.share = target + (before - target) * line.decay
-    return 0.5 * (before + line.share)
+    return (1.0 + line.faster) * (0.5 * (before + line.share))
 
 
 @compilable

@@ -157,6 +157,8 @@ SCRATCH = np.dtype(
             "inertia way speed torque resistance oil_stiffness travel arm slope "
             # net opening of the valve [m²], below 0 towards B
             "open_area "
+            # part by which oil is faster through the valve than at the references
+            "faster "
             # of a sub-step: damping, oil stiffness times step, weight of the new state,
             # torque at rest, f and g of `pump`, and the mean of both
             "drag stiffness weight push thrust sweep pull"
@@ -171,6 +173,7 @@ LINE = np.dtype(
         # that follow a log
         "pressure share demand demanded decay taken "
         "centre "  # part of the valves' open centre that is left
+        "faster "  # part by which the engine is faster than at the reference
         # of a sub-step: as `pump` sums them; change of pressure
         "drawn softness swept change"
     )

@@ -31,6 +31,16 @@ that a load does not slow the motion while the supply can lift it. The drop is
 
 with `compensation` κ: 0 without a compensator, as in the article, 1 with an ideal one.
 
+Oil that is warmer flows more easily, and where a pump has no limit in the model, an
+engine that turns faster moves the joints faster. So all openings are multiplied by
+
+    (n/n_ref)^e exp(k (T - T_ref)),
+
+with the engine speed n and the oil temperature T of the log, e `engine_exponent` and k
+`temperature_effect`. At the references, and with e and k at 0, that is 1. A speed is in
+proportion to it but for what damping takes. Flow limit, leakage and anti-cavitation
+valve stay as they are.
+
 dynamic         `port_flow` and `meter`: flows that follow from the pressures of the
                 chambers, with leakage, an anti-cavitation valve and p_cr
 quasi-static    `rod_speed`: the same edges solved for the speed at which forces
@@ -110,6 +120,13 @@ def conductance(flow_coefficient) -> Any:
 
 
 @compilable
+def faster(c, engine: float, warmer: float) -> float:
+    """Part by which oil is faster through a valve than at the references, with the
+    engine speed over its own, and the oil `warmer` than its own [K]."""
+    return engine**c.engine_exponent * np.exp(c.temperature_effect * warmer) - 1.0
+
+
+@compilable
 def root(drop, transition) -> Any:
     """Regularised sgn(Δp) √|Δp| [√Pa] and its derivative [1/√Pa] at a pressure drop [Pa]."""
     square = drop * drop
@@ -170,8 +187,9 @@ def meter(c, w, area: float, supply: float) -> None:
 
     `area` is the net opening [m²]; w is the joint's scratch space of a look-ahead.
     """
-    a = np.maximum(area, 0.0)
-    b = np.maximum(-area, 0.0)
+    eased = (1.0 + w.faster) * area
+    a = np.maximum(eased, 0.0)
+    b = np.maximum(-eased, 0.0)
     _fill(c, w.a, supply, c.leakage + a, c.leakage + b * c.a.return_)
     _fill(c, w.b, supply, c.leakage + b, c.leakage + a * c.b.return_)
 
@@ -191,12 +209,12 @@ def rod_speed(c, w, supply: float) -> Any:
 
     The scratch space w has the net opening `open_area` [m²], above 0 towards A, the load
     `push` of gravity and springs, dry friction `thrust` [N], damping `drag` [N·s/m]; of
-    a rotary actuator torques. P is `supply`.
+    a rotary actuator torques. It is `faster` by a part. P is `supply`.
     """
     if w.open_area == 0.0:
         return 0.0, 0.0, 0.0
     side, other, sign = (c.a, c.b, 1.0) if w.open_area > 0.0 else (c.b, c.a, -1.0)
-    area = abs(w.open_area)
+    area = (1.0 + w.faster) * abs(w.open_area)
     load = sign * w.push + w.thrust
     drag = w.drag
     # what the drops over both edges take from the force of the oil, over v²

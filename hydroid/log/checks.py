@@ -6,6 +6,7 @@ import numpy as np
 
 from hydroid.arrays import Array, Ints
 from hydroid.log.clues import CLUES, column_unit
+from hydroid.log.conditions import is_condition
 from hydroid.log.log import LogFinding
 from hydroid.log.repair import FINER, GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
@@ -143,7 +144,9 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
         remedy = dict[str, str]()
         if len(rows) > MANY * (values != 0).sum():
             kind, remedy = _explained(signal, values, likely)
-        factor = UNITS[signal.unit].factor
+        if is_condition(signal):
+            kind = "condition outside"
+        factor = UNITS[signal.unit.lower()].factor
         numbers = {
             "value": values[rows[0]] / factor,
             "low": signal.low / factor,

@@ -41,6 +41,9 @@ class Log:
         pose: in which joints stand that are not measured [rad], shape (J,); None: it is
             not known.
         begin: time of its first sample in the recording, of which it may be a part [s].
+        conditions: engine speed over its reference, and how much warmer the oil is than
+            at its own [K], shape (T, 2); 1 and 0 where the log has no such column. None:
+            it has neither.
         clock: time of day at which the recording begins, HH:MM:SS; empty where the file
             has none.
     """
@@ -56,6 +59,7 @@ class Log:
     pose: Array | None = None
     begin: float = 0.0
     clock: str = ""
+    conditions: Array | None = None
 
     @property
     def joints(self) -> int:
@@ -191,6 +195,8 @@ class Log:
         )
         if self.pressure is not None:
             part = replace(part, pressure=self.pressure[samples])
+        if self.conditions is not None:
+            part = replace(part, conditions=self.conditions[samples])
         if self.recorded is not None:
             part = replace(part, recorded=self.recorded[samples])
         return part

@@ -10,6 +10,7 @@ import numpy as np
 
 from hydroid.arrays import Limits
 from hydroid.errors import LogError
+from hydroid.log.conditions import condition_signals, is_condition
 from hydroid.log.log import LogFinding, log_finding
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal, Table
@@ -71,7 +72,7 @@ def map_signals(
             )
             for part, name in enumerate(columns.column):
                 signals.append(replace(signal, name=name, part=part))
-    return signals
+    return [*signals, *condition_signals(settings)]
 
 
 def _setting(settings: LogSettings, kind: Kind, joint: int, owner: str) -> str:
@@ -118,7 +119,8 @@ def measured_signals(table: Table, signals: Sequence[Signal]) -> list[Signal]:
     """Return signals without those of angles and pressures that a file lacks."""
     kept = list[Signal]()
     for signal in signals:
-        if signal.kind in ("time", "command") or signal.name in table.names:
+        is_asked = signal.kind in ("time", "command") or is_condition(signal)
+        if is_asked or signal.name in table.names:
             kept.append(signal)
     return kept
 
@@ -214,12 +216,17 @@ def _lacks_columns(
         descriptions.append(f"{signal.name!r} ({about})")
     spare = [*filter(None, unused.values())] or ["none"]
     what = f"lacks {listed(descriptions, 2)}; columns without a use: {listed(spare, 3)}"
-    settings = listed([*dict.fromkeys(f"log.{signal.kind}" for signal in lacking)])
+    settings = listed([*dict.fromkeys(_key(signal) for signal in lacking)])
     hint = (
         f"in the config, set {settings} to the right column, or to null if the log has "
         "none"
     )
     return LogError(what, _header_of(table), hint)
+
+
+def _key(signal: Signal) -> str:
+    """Return the key of the settings that name the column of such signals."""
+    return f"log.{signal.kind.replace(' ', '_')}"
 
 
 def _header_of(table: Table) -> str:

@@ -9,6 +9,7 @@ from hydroid.errors import LogError
 from hydroid.log.bags import open_bag
 from hydroid.log.binary import BINARY, first_bytes
 from hydroid.log.checks import check_recording
+from hydroid.log.conditions import only_present
 from hydroid.log.csv import open_csv
 from hydroid.log.lengths import as_angles
 from hydroid.log.log import Log, LogFinding, by_level, log_finding
@@ -163,6 +164,7 @@ def _read(
     table = open_table(path, settings, progress)
     if reading.outputs is None:
         signals = measured_signals(table, signals)
+        signals = only_present(table, signals, findings)
     signals = match_columns(table, signals, needed, findings)
     signals = with_work(table, signals, settings.work, findings)
     recording = table.read(signals)

@@ -17,6 +17,7 @@ import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.errors import LogError
+from hydroid.log.conditions import relative
 from hydroid.log.log import Log, LogFinding
 from hydroid.log.rates import LEAST_EMPTY, join_rates
 from hydroid.log.table import Recording, Signal, number
@@ -343,6 +344,7 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
         angle=angle,
         period=period,
         pressure=pressure,
+        conditions=relative(recording, grid, time),
         recorded=None if recorded.all() else recorded,
     )
 

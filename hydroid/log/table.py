@@ -40,7 +40,7 @@ class Signal:
 
     Attributes:
         name: in the header.
-        kind: time, command, angle or pressure.
+        kind: time, command, angle, pressure, engine speed or oil temperature.
         joint: its number from 1; 0 for the time.
         part: 1 for the column of a command's negative direction and of the pressure in
             chamber B, else 0.
@@ -50,6 +50,7 @@ class Signal:
         rest: value of a command before its first message, in a format of messages.
         rod: the cylinder whose length the cells of an angle are.
         setting: key of the settings that name its column.
+        reference: of an engine's speed, or an oil's temperature, in SI.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Signal:
     rest: float = 0.0
     rod: Rod | None = None
     setting: str = ""
+    reference: float = 0.0
 
     @property
     def shown(self) -> Display:

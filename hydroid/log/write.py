@@ -8,6 +8,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import csv_text, write_atomic
+from hydroid.log.conditions import absolute, is_condition
 from hydroid.log.log import Log
 from hydroid.log.mapping import map_signals
 from hydroid.log.repair import hold
@@ -62,6 +63,8 @@ def write_logs(
         for signal in signals:
             if signal.kind == "pressure" and log.pressure is None:
                 continue
+            if is_condition(signal) and log.conditions is None:
+                continue
             values = _values(signal, log, command)
             columns[signal.name] = _cells(signal, values, exact=exact)
     rows = zip(*columns.values(), strict=True)
@@ -100,6 +103,8 @@ def _values(signal: Signal, log: Log, command: Array) -> Array:
     if signal.kind == "pressure":
         assert log.pressure is not None
         return log.pressure[:, joint, signal.part]
+    if is_condition(signal):
+        return absolute(signal, log)
     return log.time
 
 

@@ -109,6 +109,7 @@ def _roll_some(
     numbers = 2 * shared.warnings.size - 1
     nothing = np.empty(0)
     no_openings = np.empty((0, 0))
+    at_references = np.empty((0, 2))
     no_states: Structs = np.empty((0, plants.state.shape[1]), plants.state.dtype)
     for i in range(rows[0], rows[1]):
         if plants.failed[i]:
@@ -141,7 +142,9 @@ def _roll_some(
             period=plugin.period,
             substeps=plugin.substeps,
         )
-        course = Course(plants.commands[i], plants.torque[i], nothing, no_openings)
+        course = Course(
+            plants.commands[i], plants.torque[i], nothing, no_openings, at_references
+        )
         trace = Trace(plants.angle[i], no_states)
         if quasi_static:
             roll_quasi_static(handles, actuators, plants.state[i], course, trace)

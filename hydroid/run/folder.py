@@ -117,7 +117,8 @@ def samples(log: Log) -> bytes:
     """Return the digest of a log's samples, wherever they are from."""
     shape = repr((log.period, log.rest, log.angle.shape))
     content = hashlib.sha256(shape.encode())
-    for signal in (log.time, log.command, log.angle, log.pressure, log.recorded):
+    signals = [log.time, log.command, log.angle, log.pressure, log.recorded]
+    for signal in (*signals, log.conditions):
         if signal is not None:
             content.update(signal.tobytes())
     return content.digest()

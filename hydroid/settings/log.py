@@ -102,6 +102,47 @@ class Columns(Settings):
     """is added to the scaled cells, in `unit`; default: 0"""
 
 
+class EngineSpeed(Settings):
+    """The column of the engine's speed: value = scale · cell + offset."""
+
+    column: Name
+    """name in the header"""
+    unit: Literal["rpm", "rev/s"] = "rpm"
+    """unit of the scaled cells"""
+    scale: Annotated[Number, AfterValidator(_nonzero)] = 1.0
+    """factor on the cells"""
+    offset: Number = 0.0
+    """is added to the scaled cells"""
+    reference: Annotated[Number, Field(gt=0)]
+    """speed at which `pump_flow` and all openings are stated, in `unit`; `init` writes
+    the median of the logs"""
+
+
+class OilTemperature(Settings):
+    """The column of the oil's temperature: value = scale · cell + offset."""
+
+    column: Name
+    """name in the header"""
+    unit: Literal["degC", "degF"] = "degC"
+    """unit of the scaled cells"""
+    scale: Annotated[Number, AfterValidator(_nonzero)] = 1.0
+    """factor on the cells"""
+    offset: Number = 0.0
+    """is added to the scaled cells"""
+    reference: Number
+    """temperature at which all openings are stated, in `unit`; `init` writes the median
+    of the logs"""
+
+
+Condition = EngineSpeed | OilTemperature
+Input = Literal["engine_speed", "oil_temperature"]
+"""what a machine works under besides commands: settings of a log"""
+EFFECTS: dict[Input, str] = {
+    "engine_speed": "engine_exponent",
+    "oil_temperature": "temperature_effect",
+}
+"""the quantity by which each acts on the joints' speeds"""
+
 Span = tuple[NotNegative, NotNegative]
 
 
@@ -202,6 +243,13 @@ class LogSettings(Settings):
     """columns of the angles; null: the log holds none"""
     pressure: Common = None
     """columns of the chamber pressures; null: the log holds none"""
+    engine_speed: EngineSpeed | None = None
+    """column of the engine's speed, which sets the flow of a pump with a limit and, by
+    `engine_exponent`, the speeds of joints; null: it is as at all times. All logs of a
+    fit must have it"""
+    oil_temperature: OilTemperature | None = None
+    """column of the oil's temperature, which sets the speeds of joints by
+    `temperature_effect`; null: it is as at all times. All logs of a fit must have it"""
     joints: ByJoint[JointColumns | None] = {}
     """what differs for single joints, by joint; null: the log does not hold this
     joint"""
@@ -248,6 +296,10 @@ class LogSettings(Settings):
         )
         return ColumnMap(names, **given)
 
+    def condition(self, name: Input) -> Condition | None:
+        """Return the column of what a machine works under; None: not in the log."""
+        return getattr(self, name)
+
     def group_of(self, log: str) -> str:
         """Return the group of a log by its file's name and folders.
 
@@ -273,10 +325,11 @@ class LogSettings(Settings):
         return copy
 
     def angles_only(self) -> "LogSettings":
-        """Return the columns of a trajectory: whatever commands and pressures it holds
-        are not read, and no stretch of it is left out."""
+        """Return the columns of a trajectory: whatever else it holds is not read, and no
+        stretch of it is left out."""
         nothing = {"command": None, "pressure": None}
+        inputs = dict.fromkeys(EFFECTS)
         joints = {
             joint: own and own.changed(nothing) for joint, own in self.joints.items()
         }
-        return self.changed(nothing | {"joints": joints, "work": Work()})
+        return self.changed(nothing | inputs | {"joints": joints, "work": Work()})

@@ -33,6 +33,7 @@ BEHIND_VALVE = [
         "lever_bend",
         "compensation",
     ),
+    *("engine_exponent", "temperature_effect"),
     *("oil_frequency", "oil_damping", "oil_damping_share"),
     *("ring_cosine", "ring_sine"),
     *(

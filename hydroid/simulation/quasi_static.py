@@ -35,7 +35,12 @@ from numba import njit
 from hydroid.hydraulics.cylinder import weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
-from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
+from hydroid.hydraulics.kernel import (
+    Plugin,
+    make_pad,
+    source_key,
+    take_conditions,
+)
 from hydroid.hydraulics.oil import overshoot, store_oil
 from hydroid.hydraulics.pump import begin_line, centre_left, come_up, line_pressure
 from hydroid.hydraulics.valve import rod_speed
@@ -106,7 +111,7 @@ def roll_quasi_static(
     coefficients = plugin.coefficients
     driven = plugin.order[plugin.idle :]
     period = plugin.period
-    commands, followed, taken, opening = course
+    commands, followed, taken, opening, conditions = course
     steps = followed.shape[0]
     past = commands.shape[0] - steps
     pad = make_pad(plugin.order.size)
@@ -137,6 +142,8 @@ def roll_quasi_static(
             else:
                 w.open_area = mean_opening(c, z, w, commands[:, j], now, plugin)
             demanded |= commands[now, j] != 0.0
+        if conditions.size:
+            take_conditions(plugin, pad, conditions[k])
         hold(links, arm.angle, held)
         for a in range(driven.size):
             j = driven[a]

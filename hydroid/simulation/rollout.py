@@ -30,7 +30,14 @@ from numpy.typing import NDArray
 
 from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.elementwise import compilable
-from hydroid.hydraulics.kernel import SOURCE, Plugin, look_ahead, make_pad, take_over
+from hydroid.hydraulics.kernel import (
+    SOURCE,
+    Plugin,
+    look_ahead,
+    make_pad,
+    take_conditions,
+    take_over,
+)
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
 from hydroid.simulation.gravity import LINK
 
@@ -84,6 +91,10 @@ class Handles(NamedTuple):
     limits: Array  # of the angles [rad], (V, 2)
 
 
+AT_REFERENCES = np.empty((0, 2))
+"""conditions of a course that has neither engine speed nor oil temperature"""
+
+
 class Course(NamedTuple):
     """What drives an arm from step to step.
 
@@ -91,13 +102,16 @@ class Course(NamedTuple):
     steps, J). torque: of pushed joints [N·m], shape (T steps, P). taken: flow from the
     pump into pushed joints [m³/s], shape (T steps,); or it is empty. opening: of the
     valves in the mean [m²], shape (T steps, J), where they are known before a
-    quasi-static rollout; or it is empty.
+    quasi-static rollout; or it is empty. conditions: engine speed over its reference,
+    and how much warmer the oil is than at its own [K], shape (T steps, 2); or it is
+    empty: both are at their references.
     """
 
     commands: Array
     torque: Array
     taken: Array = np.empty(0)
     opening: Array = np.empty((0, 0))
+    conditions: Array = AT_REFERENCES
 
 
 class Trace(NamedTuple):
@@ -288,13 +302,15 @@ def write_sample(arm, trace, state, k: int) -> None:
 def roll(arm, plugin: Plugin, state, course, trace, source: int = SOURCE) -> None:
     """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for
     numba's cache."""
-    commands, torque, taken, _ = course
+    commands, torque, taken, _, conditions = course
     steps = torque.shape[0]
     past = commands.shape[0] - steps
     pad = make_pad(state.size)
     for k in range(steps):
         if taken.size:
             pad.line[0].taken = taken[k]
+        if conditions.size:
+            take_conditions(plugin, pad, conditions[k])
         if state.size:
             look_ahead(plugin, state, commands, past + k, arm, pad)
         for i in range(arm.pushed.size):

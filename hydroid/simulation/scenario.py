@@ -21,7 +21,7 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation.gravity import make_links
 from hydroid.simulation.roles import Roles, roles
-from hydroid.simulation.rollout import NO_LINKS, SteppedArm
+from hydroid.simulation.rollout import AT_REFERENCES, NO_LINKS, SteppedArm
 from hydroid.simulation.rolls import ROLLS
 
 ARMATURE = 1e6
@@ -161,6 +161,7 @@ class Scenario:
         roles: of the arm's joints.
         outputs: columns of the outputs among the moving joints, shape (K,).
         command: held during each step [%], shape (steps, V).
+        conditions: engine speed and oil temperature during each step, as of a `Course`.
         period: between samples [s].
         prescribed: the joints that follow the log.
         pressure: in which the moving joints' chambers rest at the start [Pa], (V, 2),
@@ -190,6 +191,9 @@ class Scenario:
         self.outputs = np.searchsorted(self.arm.columns, outputs)
         # the last command acts only after the last sample
         self.command = np.repeat(log.command[:-1, moving], stepping.steps, axis=0)
+        self.conditions = AT_REFERENCES
+        if log.conditions is not None:
+            self.conditions = np.repeat(log.conditions[:-1], stepping.steps, axis=0)
         self.pressure = log.start_pressure[moving]
         self.period = log.period
         follows = np.flatnonzero(self.roles.following)
@@ -208,11 +212,13 @@ class Scenario:
         other commands.
 
         `command` is held during each step [%], shape (steps, V). No joint may follow
-        the log. Springs are slack where they were.
+        the log. Springs are slack where they were; engine and oil are at their
+        references.
         """
         other = copy(self)
         other.arm = replace(self.arm, pose=start)
         other.command = command
+        other.conditions = AT_REFERENCES
         return other
 
     def values(self, candidates: Candidates) -> dict[str, Array]:

@@ -280,7 +280,8 @@ class Simulation:
         angle[0] = start
         history[0] = state
         taken = ready.taken[row]
-        course = Course(ready.commands, torque, taken, ready.openings[row])
+        openings = ready.openings[row]
+        course = Course(ready.commands, torque, taken, openings, scenario.conditions)
         # the start is known: what is rolled out comes after it
         trace = Trace(angle[1:], history[1:])
         arm.roll(actuators, state, course, trace)

@@ -14,6 +14,7 @@ import numpy as np
 from hydroid.arrays import Array, Limits, record
 from hydroid.files import Plain
 from hydroid.hydraulics.actuator import START_PRESSURE
+from hydroid.log.conditions import varies
 from hydroid.posterior.error_model import Likelihood
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import (
@@ -26,6 +27,7 @@ from hydroid.quantity_table import (
 from hydroid.rungs import stage_has
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import actuator_values
+from hydroid.settings.log import WITH_INPUT
 from hydroid.settings.problem import ParameterSettings
 
 
@@ -113,7 +115,11 @@ def _means_something(problem: Problem, parameter: ParameterSettings) -> bool:
 
 
 def _moving(problem: Problem, quantity: str, joints: Iterable[int]) -> tuple[int, ...]:
-    """Return those of some joints that move, by an actuator that has the quantity."""
+    """Return those of some joints that move, by an actuator that has the quantity; none
+    where it is the effect of what the logs do not vary."""
+    told_by = WITH_INPUT.get(quantity)
+    if told_by and not varies(problem.logs, told_by):
+        return ()
     every = problem.settings.arm.joints
     return tuple(
         j for j in joints if j in problem.active_joints and every[j - 1].has(quantity)

@@ -40,8 +40,9 @@ from hydroid.log import (
     open_table,
     write_log,
 )
+from hydroid.log.conditions import stated, varies, words_of
 from hydroid.settings.fit import FitSettings
-from hydroid.settings.log import LogSettings
+from hydroid.settings.log import EFFECTS, Input, LogSettings
 from hydroid.words import listed
 
 if TYPE_CHECKING:
@@ -116,7 +117,7 @@ def check(
     shown = tables(agreements, names, every=False)
     details = tables(agreements, names, every=True)
     content = {
-        "logs": [_plain(log_check, names) for log_check in checks],
+        "logs": [_plain(log_check, settings) for log_check in checks],
         "agreement": plain(agreements, names),
     }
     content = in_joint_units(content, settings.arm)
@@ -124,6 +125,7 @@ def check(
         [
             *_finding_lines(checks),
             *_sizes(checks, settings),
+            *_steady(parts, settings.log),
             *shown,
             *_summary(agreements, names),
         ],
@@ -224,12 +226,39 @@ def _sizes(checks: Sequence[LogCheck], settings: FitSettings) -> Iterator[str]:
             ways.append(f"{name} by {shown[name].way(travel)}")
         size = f"{len(log.time)} samples, {log.duration:.2f} s"
         moved = ", ".join(ways) or "nothing"
-        yield f"{log.source}: {size}; driven and moved: {moved}"
+        under = "".join(
+            f"; {words_of(name)} {least:.4g} to {most:.4g} {unit}"
+            for name, (least, most, unit) in _conditions(log, settings.log).items()
+        )
+        yield f"{log.source}: {size}; driven and moved: {moved}{under}"
 
 
-def _plain(log_check: LogCheck, names: Sequence[str]) -> Plain:
+def _conditions(
+    log: Log, settings: LogSettings
+) -> dict[Input, tuple[float, float, str]]:
+    """Return between which values the engine's speed and the oil's temperature lie, and
+    the unit of these."""
+    ends = dict[Input, tuple[float, float, str]]()
+    for name in EFFECTS:
+        column = settings.condition(name)
+        values = stated(log, settings, name)
+        if column is not None and values is not None:
+            ends[name] = float(values.min()), float(values.max()), column.unit
+    return ends
+
+
+def _steady(logs: Sequence[Log], settings: LogSettings) -> Iterator[str]:
+    """Yield which columns hold too little of a condition to tell its effect."""
+    for name in EFFECTS:
+        if logs and settings.condition(name) and not varies(logs, name):
+            what = f"The {words_of(name)} is nearly the same in all logs"
+            yield f"{what}: its effect cannot be told."
+
+
+def _plain(log_check: LogCheck, settings: FitSettings) -> Plain:
     """Return a log as JSON holds it."""
     log = log_check.log
+    names = settings.arm.joint_names
     content: Plain = {
         "log": str(log_check.path),
         "usable": _is_usable(log_check),
@@ -244,6 +273,8 @@ def _plain(log_check: LogCheck, names: Sequence[str]) -> Plain:
         content["samples"] = len(log.time)
         content["duration_s"] = log.duration
         content["driven_joints"] = np.array(names)[log.driven].tolist()
+        for name, (least, most, unit) in _conditions(log, settings.log).items():
+            content[name] = {"from": least, "to": most, "unit": unit}
     return content
 
 
@@ -301,7 +332,7 @@ def convert(
     if not parts:
         raise findings[0].error()
     read = _with_gaps(parts)
-    write_log(Path(out), read, _plain_layout(read), exact=True)
+    write_log(Path(out), read, _plain_layout(read, layout), exact=True)
     lines = [f"{finding.level}: {finding}" for finding in findings]
     size = f"{out}: {len(read.time)} samples, {read.duration:.2f} s, every {read.period:g} s"
     longest = max(parts, key=lambda part: part.duration)
@@ -333,22 +364,31 @@ def _with_gaps(parts: Sequence[Log]) -> Log:
         samples = np.ceil((part.begin - first.begin) / first.period - 1e-6)
         times.append(first.period * (samples + np.arange(len(part.time))))
     pressures = [part.pressure for part in parts if part.pressure is not None]
+    conditions = [part.conditions for part in parts if part.conditions is not None]
     return replace(
         first,
         time=np.concatenate(times),
         command=np.concatenate([part.command for part in parts]),
         angle=np.concatenate([part.angle for part in parts]),
         pressure=np.concatenate(pressures) if pressures else None,
+        conditions=np.concatenate(conditions) if conditions else None,
     )
 
 
-def _plain_layout(log: Log) -> LogSettings:
-    """Return the default columns of what a log holds: commands, angles, pressures of
-    both chambers."""
+def _plain_layout(log: Log, settings: LogSettings) -> LogSettings:
+    """Return the columns of what a log holds that was read by settings: commands,
+    angles, pressures of both chambers by default, engine speed and oil temperature in
+    their units."""
     columns: dict[int, dict[str, None] | None] = {}
     for joint, measured in enumerate(log.has_angle):
         absent: dict[str, None] = {} if measured else {"angle": None}
         if log.pressure is None or np.isnan(log.pressure[0, joint]).any():
             absent["pressure"] = None
         columns[joint + 1] = absent if measured or log.driven[joint] else None
-    return LogSettings.model_validate({"pressure": {}, "joints": columns})
+    conditions: Plain = {}
+    for name in EFFECTS:
+        column = settings.condition(name)
+        if column is not None:
+            plain = {"column": f"{name}_{column.unit}", "scale": 1.0, "offset": 0.0}
+            conditions[name] = column.changed(plain)
+    return LogSettings.model_validate({"pressure": {}, "joints": columns, **conditions})

@@ -22,6 +22,7 @@ from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.oil import fills
 from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
 from hydroid.hydraulics.solenoid import drive, resting_stroke
+from hydroid.hydraulics.valve import faster
 
 # in chamber B at the start where neither settings nor log say [Pa]; ours
 START_PRESSURE = 50e5
@@ -41,6 +42,23 @@ def make_plugin(
     table = coefficients(joints, period, substeps).view(np.ndarray)
     idle = int(np.sum(~driven))
     return Plugin(table, order, entries[np.ix_(order, order)], idle, period, substeps)
+
+
+def under_conditions(joints: Records, engine: float, warmer: float) -> Records:
+    """Return candidates' joints, of JOINT, as they are at a constant engine speed over
+    its reference, with oil warmer than at its own [K].
+
+    What `kernel.take_conditions` does to valves and pump from step to step is in their
+    values here.
+    """
+    changed = joints.copy()
+    eased = 1.0 + faster(joints, engine, warmer)
+    for side in "ab":
+        changed[f"opening_{side}"] = eased * joints[f"opening_{side}"]
+    changed["pump_flow"] = engine * joints.pump_flow
+    # a multiple of that flow, and an opening that no engine changes
+    changed["pump_bypass"] = joints.pump_bypass / engine
+    return changed
 
 
 def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:

@@ -1,15 +1,17 @@
 """What a machine works under besides commands: the speed of its engine, and the
 temperature of its oil, each relative to a reference."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from hydroid.arrays import Array, Limits
+from hydroid.errors import SettingsError
 from hydroid.log.log import Log, LogFinding, log_finding
 from hydroid.log.table import Recording, Signal, Table
 from hydroid.settings.log import EFFECTS, Input, LogSettings
 from hydroid.units import UNITS
+from hydroid.words import listed
 
 SLOWEST = 0.1
 """part of its reference below which an engine does not run"""
@@ -36,7 +38,7 @@ def condition_signals(settings: LogSettings) -> Iterator[Signal]:
         if column is None:
             continue
         factor = UNITS[column.unit.lower()].factor
-        low, high = _limits(name, column.unit, column.reference)
+        low, high = limits(name, column.unit, column.reference)
         yield Signal(
             name=column.column,
             kind=words_of(name),
@@ -51,7 +53,8 @@ def condition_signals(settings: LogSettings) -> Iterator[Signal]:
         )
 
 
-def _limits(name: Input, unit: str, reference: float) -> Limits:
+def limits(name: Input, unit: str, reference: float) -> Limits:
+    """Return the least and the largest value of a machine that works, in a unit."""
     if name == "engine_speed":
         return SLOWEST * reference, FASTEST * reference
     return COLDEST[unit], HOTTEST[unit]
@@ -125,6 +128,38 @@ def stated(log: Log, settings: LogSettings, name: Input) -> Array | None:
         return log.conditions[:, 0] * column.reference
     factor = UNITS[column.unit.lower()].factor
     return log.conditions[:, 1] / factor + column.reference
+
+
+def relative_to(
+    settings: LogSettings, values: Mapping[str, float]
+) -> tuple[float, float]:
+    """Return an engine's speed over its reference, and how much warmer oil is than at
+    its own [K], of values in the units of the settings.
+
+    Raises SettingsError: the settings have no such column, or no machine works so.
+    """
+    conditions = [*NEITHER]
+    for place, name in enumerate(EFFECTS):
+        value = values.get(name)
+        column = settings.condition(name)
+        if value is None:
+            continue
+        if column is None:
+            hint = f"the fit's logs have no column log.{name}"
+            raise SettingsError("no effect of it is known", name, hint)
+        low, high = limits(name, column.unit, column.reference)
+        if not low <= value <= high:
+            what = f"{value:.6g} {column.unit} is not from {low:.6g} to {high:.6g}"
+            raise SettingsError(what, name)
+        factor = UNITS[column.unit.lower()].factor
+        conditions[place] = value / column.reference
+        if name == "oil_temperature":
+            conditions[place] = (value - column.reference) * factor
+    if stray := values.keys() - EFFECTS.keys():
+        hint = f"choose {listed([*EFFECTS])}"
+        raise SettingsError(f"no {listed(sorted(stray))}", "conditions", hint)
+    engine, warmer = conditions
+    return engine, warmer
 
 
 def varies(logs: Sequence[Log], name: Input) -> bool:

@@ -20,6 +20,7 @@ from hydroid.log.angle_columns import angle_entries
 from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.columns import Column, Entry, beside, rises, signal_columns
 from hydroid.log.command_columns import command_entries
+from hydroid.log.condition_columns import guess_conditions
 from hydroid.log.joint_columns import Assignment, Joints, by_joint
 from hydroid.log.rods import Rod
 from hydroid.log.table import Table
@@ -88,12 +89,21 @@ def guess_columns(
                 f"{column.name}: a position target of a controller, not a valve's opening"
             )
     unused = _unused(table, time, (*commands.values(), *angles.values()))
+    used = {*table.names} - {*unused}
+    conditions: Plain = {}
+    for found in guess_conditions(tables, (*joints, *links), used):
+        reasons.append(found.reason)
+        if found.settings:
+            conditions[found.name] = found.settings
+    taken = [one["column"] for one in conditions.values()]
+    unused = tuple(name for name in unused if name not in taken)
     if unused:
         reasons.append(f"not used: {listed(unused)}")
     log: Plain = {
         "time": {"column": time.name, "unit": unit},
         "command": None,
         "angle": None,
+        **conditions,
         "period_s": nearest_period(step),
         "joints": _joint_settings(of_commands, of_angles),
     }

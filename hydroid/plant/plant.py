@@ -16,10 +16,11 @@ from hydroid.arrays import Array, Index, Structs
 from hydroid.errors import RunError, SettingsError
 from hydroid.estimate import write_estimate
 from hydroid.files import Plain
-from hydroid.hydraulics.actuator import pressures
+from hydroid.hydraulics.actuator import pressures, under_conditions
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import JOINT_STATE, Records, has_force_curve
 from hydroid.identified_model import IdentifiedModel, write_settings
+from hydroid.log.conditions import relative_to
 from hydroid.mjcf import quiet_mujoco, read_mjcf
 from hydroid.plant.steady import SteadyArm, SteadyCommands, Weighing, by_name
 from hydroid.problem.bindings import Bindings
@@ -73,6 +74,8 @@ class Plant:
         period: how long one command is held [s], a multiple of MuJoCo's step; by
             default the logs' period.
         payload: mass at the tip [kg].
+        conditions: `engine_speed` and `oil_temperature`, in the units of the settings'
+            log; by default as at their references.
         shapes: whether `model` has them. Without them nothing can be drawn, and many
             plants are stepped faster, to the same bits.
 
@@ -85,7 +88,7 @@ class Plant:
 
     Raises:
         SettingsError: a joint that does not exist, a period that is no multiple,
-            or parameters without a force-stroke curve.
+            conditions that the fit's logs do not hold, or parameters without a force-stroke curve.
     """
 
     def __init__(
@@ -95,6 +98,7 @@ class Plant:
         joints: Sequence[int | str] | None = None,
         period: float | None = None,
         payload: float = 0.0,
+        conditions: Mapping[str, float] | None = None,
         shapes: bool = True,
     ) -> None:
         settings = identified.settings
@@ -113,7 +117,12 @@ class Plant:
         self._spec = load_model(arm)
         if payload:
             self._spec = add_payload(self._spec, arm, payload)
-        self._candidate = Bindings(settings).candidates(identified.theta[None])
+        candidate = Bindings(settings).candidates(identified.theta[None])
+        if conditions:
+            engine, warmer = relative_to(settings.log, conditions)
+            joints = under_conditions(candidate.joints, engine, warmer)
+            candidate = Candidates(joints, candidate.mass)
+        self._candidate = candidate
         if settings.stage == "hyd":
             _refuse_without_force(self._candidate, identified.source)
         # none yet: the first reset locks whatever does not move
@@ -379,7 +388,7 @@ class Plant:
         return self.angle
 
     def save(self, folder: str | Path) -> None:
-        """Write the plant, without payload, to a folder that `load_plant` reads;
+        """Write the plant, without payload and as at the references, to a folder that `load_plant` reads;
         `export` to `model/` there.
 
         Raises:

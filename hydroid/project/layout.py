@@ -19,6 +19,8 @@ from hydroid.log import (
     stands_still,
 )
 from hydroid.log.clues import column_unit, kind_of
+from hydroid.log.condition_columns import condition_guess
+from hydroid.log.conditions import varies
 from hydroid.log.log import LEAST_COMMAND
 from hydroid.log.mapping import angle_margin
 from hydroid.progress import Progress, no_progress
@@ -28,7 +30,7 @@ from hydroid.project.mirrored import mirror_sensors, of_other_sign
 from hydroid.project.section import given_section, guessed_section, missing_column
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
-from hydroid.settings.log import LogSettings
+from hydroid.settings.log import EFFECTS, Input, LogSettings
 from hydroid.words import listed
 
 GUESSED = "GUESSED from the log: check every line."
@@ -57,7 +59,8 @@ class Layout:
     move, by number from 1, and `valves` those by which the outputs follow commands of
     the sign that these have in the section; `left_out` are further logs that cannot be
     read by it; `reach`: the ends of what joints do in the others [rad, m]; `reasons`
-    have a line for each column that is not `unused`; `followed`: a joint that no
+    have a line for each column that is not `unused`; `varied`: an engine's speed or an
+    oil's temperature of which the logs hold enough to tell its effect; `followed`: a joint that no
     command drives moves. `missing` says
     which columns a person must name, in a section that is then no more than a start;
     `candidates` are lines about what each could be.
@@ -75,6 +78,7 @@ class Layout:
         default_factory=dict[int, tuple[float, float]]
     )
     origin: str = GUESSED
+    varied: tuple[Input, ...] = ()
     missing: str = ""
     candidates: tuple[str, ...] = ()
 
@@ -123,7 +127,33 @@ def find_layout(
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
+    guess = _of_all_logs(table, guess, others, progress)
     return _seen(table, arm, guess, others, GUESSED, progress)
+
+
+def _of_all_logs(
+    table: Table, guess: ColumnGuess, others: Others, progress: Progress
+) -> ColumnGuess:
+    """Return a guess whose engine speed and oil temperature have the median of all logs
+    as their reference; without what cannot be used of all."""
+    named: list[Input] = [name for name in EFFECTS if name in guess.log]
+    if not named or not others.paths:
+        return guess
+    tables = [table, *others.tables(progress)]
+    section = {**guess.log}
+    reasons = [*guess.reasons]
+    unused = [*guess.unused]
+    for name in named:
+        settings = section[name]
+        column = settings["column"]
+        found = condition_guess(tables, column, name, settings["unit"])
+        at = next(k for k, why in enumerate(reasons) if why.startswith(f"{column}: "))
+        reasons[at] = found.reason
+        section[name] = found.settings
+        if not found.settings:
+            del section[name]
+            unused.append(column)
+    return guess._replace(log=section, reasons=tuple(reasons), unused=tuple(unused))
 
 
 def _seen(
@@ -148,11 +178,13 @@ def _seen(
     left_out = list[Path]()
     reach = dict[int, tuple[float, float]]()
     motions = dict[int, JointMotion]()
+    varied: tuple[Input, ...] = ()
     if logs:
         fitted, unseen, left_out = read_others(
             table, settings, arm, others, reasons, progress
         )
         logs += fitted
+        varied = tuple(name for name in EFFECTS if varies(logs, name))
         reach = reach_of([*logs, *unseen], measured)
         motions = {joint: motion_of(logs[0], joint) for joint in measured}
         _refuse_rest(table, driven, logs, arm.joint_names)
@@ -173,6 +205,7 @@ def _seen(
         left_out=tuple(left_out),
         reach=reach,
         origin=origin,
+        varied=varied,
     )
 
 

@@ -19,7 +19,7 @@ from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.expansion import by_group, expanded, with_curves
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.load import ByJoint, Joints, Positive, Settings, load, validate
-from hydroid.settings.log import LogSettings, log_file
+from hydroid.settings.log import WITH_INPUT, LogSettings, log_file
 from hydroid.settings.parameters import make_parameter
 from hydroid.settings.problem import (
     ObjectiveSettings,
@@ -170,6 +170,11 @@ class FitSettings(Settings):
                 hint = STAGE_HINTS[self.stage]
                 raise ValueError(
                     f"parameters.{name}: stage {self.stage} has no {quantity}; {hint}"
+                )
+            told_by = WITH_INPUT.get(quantity)
+            if told_by and self.log.condition(told_by) is None:
+                raise ValueError(
+                    f"parameters.{name}: {quantity} needs the column log.{told_by}"
                 )
         # this raises where a parameter cannot be made
         self.parameter_set()

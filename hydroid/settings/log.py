@@ -142,6 +142,8 @@ EFFECTS: dict[Input, str] = {
     "oil_temperature": "temperature_effect",
 }
 """the quantity by which each acts on the joints' speeds"""
+WITH_INPUT: dict[str, Input] = {quantity: name for name, quantity in EFFECTS.items()}
+"""and the other way round"""
 
 Span = tuple[NotNegative, NotNegative]
 

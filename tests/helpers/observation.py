@@ -57,6 +57,10 @@ def trace(scenario: Scenario, candidates: Candidates) -> Observation:
         commands = np.concatenate(
             [np.zeros((one.past, len(states[0]))), scenario.command[:, chain.columns]]
         )
-        course = Course(commands, np.empty((len(scenario.command), 0)))
+        course = Course(
+            commands,
+            np.empty((len(scenario.command), 0)),
+            conditions=scenario.conditions,
+        )
         arm.roll(one, states[0], course, Trace(angle[1:], record[1:]))
     return observe(one.coefficients, record, angle[:, chain.columns])

@@ -195,7 +195,11 @@ def test_speed_flow_and_pressures_are_continuous_in_the_load(
         """Speed, flow from the pump, pressures of the chamber that fills and of the
         other."""
         w = SimpleNamespace(
-            open_area=opening, push=np.sign(opening) * load, thrust=200.0, drag=drag
+            open_area=opening,
+            push=np.sign(opening) * load,
+            thrust=200.0,
+            drag=drag,
+            faster=0.0,
         )
         speed, flow, _ = rod_speed(c, w, supply)
         leaving = (

@@ -17,7 +17,8 @@ from hydroid.commands.inputs import (
 from hydroid.errors import SettingsError
 from hydroid.files import write_atomic
 from hydroid.identified_model import IdentifiedModel
-from hydroid.progress import LOGGER
+from hydroid.log.conditions import at_references
+from hydroid.progress import LOGGER, NOTE
 from hydroid.words import listed
 
 if TYPE_CHECKING:
@@ -93,6 +94,8 @@ def export(
         return _written(parameter_files(machines), folder, write=out is not None)
     from hydroid.plant import Plant
 
+    if known := at_references(model.settings.log):
+        LOGGER.log(NOTE, "note: %s", known)
     plant = Plant(model)
     if pose is not None:
         plant.reset(pose)

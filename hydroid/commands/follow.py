@@ -21,6 +21,7 @@ from hydroid.files import is_file
 from hydroid.findings import OF_ENDING, Finding
 from hydroid.joint_verdict import JointVerdict, Verdict
 from hydroid.log import Log, open_table, write_log
+from hydroid.log.conditions import at_references
 from hydroid.words import listed, plain, two_digits
 
 if TYPE_CHECKING:
@@ -103,6 +104,7 @@ def follow(
         *map(str, doubts),
         *missed_lines(followed, arm),
         *_path_lines(followed, tip, verdicts),
+        *filter(None, [at_references(model.settings.log)]),
     ]
     page = follow_page(name, followed, arm, said)
     lines: list[Table | str] = [tracking_table(followed, arm), *said]

@@ -162,6 +162,19 @@ def relative_to(
     return engine, warmer
 
 
+def at_references(settings: LogSettings) -> str:
+    """Say under which conditions a machine works of which nothing else is said; "" where
+    the settings have no column of any."""
+    known = list[str]()
+    for name in EFFECTS:
+        column = settings.condition(name)
+        if column is not None:
+            known.append(f"{words_of(name)} {column.reference:.6g} {column.unit}")
+    if not known:
+        return ""
+    return f"The machine is as at the references: {listed(known)}."
+
+
 def varies(logs: Sequence[Log], name: Input) -> bool:
     """Return whether logs hold enough of a condition to tell its effect."""
     place = [*EFFECTS].index(name)

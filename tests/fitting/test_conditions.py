@@ -20,7 +20,7 @@ VALVE = {
     "B": {"quantity": "opening_b", "nominal": 0.3, "within": 2},
 }
 ENGINE = {
-    "e": {"quantity": "engine_exponent", "nominal": 0, "sd": 0.5, "bounds": [0, 1]}
+    "e": {"quantity": "engine_exponent", "nominal": 0, "sd": 0.5, "bounds": [0, 2]}
 }
 OIL = {"k": {"quantity": "temperature_effect", "nominal": 0, "sd": 2}}
 TRUTH = {"A": 0.35, "B": 0.28, "e": 0.7, "k": 1.2}

@@ -171,7 +171,7 @@ def test_a_few_missing_values_are_rows_left_out(tmp_path):
             {"parameters.e.quantity": "engine_exponent", "parameters.e.bounds": [0, 1]},
             "engine_exponent needs the column log.engine_speed",
         ),
-        ({"hydraulics.engine_exponent": 1.5}, "engine_exponent"),
+        ({"hydraulics.engine_exponent": 2.5}, "engine_exponent"),
     ],
 )
 def test_wrong_settings_are_refused(changes, said):

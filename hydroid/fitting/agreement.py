@@ -119,6 +119,7 @@ def _thinned(log: Log) -> Log:
         pressure=None,
         rest=None if log.rest is None else log.rest // step,
         recorded=None,
+        conditions=None,
     )
 
 

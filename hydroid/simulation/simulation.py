@@ -12,9 +12,10 @@ changes a bit.
 import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from contextlib import contextmanager, suppress
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -100,6 +101,8 @@ class Simulation:
             scenario.machine, scenario.arm, scenario.roles, scenario.stepping
         )
         self.joints = self._chain.joints
+        # single arms that former candidates left
+        self._free = deque[SteppedArm]()
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
@@ -137,15 +140,10 @@ class Simulation:
     ) -> None:
         """Write what candidates do to their rows of a response."""
         # a stop is raised once the threads have ended; they begin nothing more meanwhile
-        with (
-            undisturbed() as stops,
-            quiet_mujoco(),
-            ThreadPoolExecutor(threads) as pool,
-        ):
+        with undisturbed() as stops, quiet_mujoco(), _mapping(threads) as run:
             copies = self._copies(candidates, threads)
-            # arms that no thread steps
-            free = deque(self._stepped(copies) for _ in range(threads))
-            ready = self._ready(candidates, free[0], pool.map)
+            free = self._arms(copies, threads)
+            ready = self._ready(candidates, free[0], run)
 
             def simulate(some: Index) -> None:
                 if stops:
@@ -156,14 +154,15 @@ class Simulation:
 
             groups = math.ceil(rows.size / copies)
             shares = np.array_split(range(rows.size), groups)
-            # a deque takes what the pool returns, so that errors are raised here
-            deque(pool.map(simulate, shares), maxlen=0)
+            # a deque takes what is returned, so that errors are raised here
+            deque(run(simulate, shares), maxlen=0)
             # one that diverges stops those beside it, which go again, each alone
             if copies > 1:
-                free = deque(self._stepped() for _ in range(threads))
+                free = self._arms(1, threads)
                 last = response.angle[rows, -1]
                 left = np.flatnonzero(np.isnan(last).any(axis=1))
-                deque(pool.map(simulate, left[:, None]), maxlen=0)
+                deque(run(simulate, left[:, None]), maxlen=0)
+            self._free.extend(free)
         # whoever took the signal goes on
         if stops:
             self._fill(response, rows, candidates, threads)
@@ -213,11 +212,22 @@ class Simulation:
         groups = max(threads, needed)
         return math.ceil(n / groups)
 
-    def _stepped(self, copies: int = 1) -> SteppedArm:
+    def _arms(self, copies: int, count: int) -> deque[SteppedArm]:
+        """Return so many arms, each with copies of it in one model, that nobody else
+        steps."""
+        arms = deque[SteppedArm]()
+        # other threads may simulate as well: who asks first how many there are may find
+        # none
+        with suppress(IndexError):
+            while copies == 1 and len(arms) < count:
+                arms.append(self._free.pop())
         model = self.scenario.arm.model
         if copies > 1:
             model = repeat(model, copies)
-        return self._chain.stepped(model, self.scenario.stepping.steps, copies)
+        steps = self.scenario.stepping.steps
+        while len(arms) < count:
+            arms.append(self._chain.stepped(model, steps, copies))
+        return arms
 
     def _ready(
         self,
@@ -305,6 +315,16 @@ class Simulation:
             motion = servo.angle if self._at_once else servo.torque
             torque[:, :, served] = motion[:, None]
         return torque.reshape(len(torque), -1)
+
+
+@contextmanager
+def _mapping(threads: int) -> Iterator[Callable[..., Iterable[Any]]]:
+    """Yield what maps a function over arguments in some threads; one is this one."""
+    if threads == 1:
+        yield map
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        yield pool.map
 
 
 def make_scenario(

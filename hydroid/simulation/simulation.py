@@ -51,6 +51,8 @@ class Oil(NamedTuple):
 
 TOGETHER = 56
 """joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
+OF_MOTION = ("dof_damping", "dof_frictionloss")
+"""fields of mjModel that do nothing to an arm at rest"""
 
 
 @record
@@ -244,7 +246,7 @@ class Simulation:
         n = len(candidates)
         values = scenario.values(candidates)
         pose = scenario.arm.pose
-        balance = _balance(arm, values, pose, n)
+        balance = _balance(arm, values, pose)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         before = np.zeros((plugin.past, len(chain.columns)))
         commands = np.concatenate([before, scenario.command[:, chain.columns]])
@@ -370,17 +372,20 @@ def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
     return Oil(pressures(coefficients, history, angle), flow, line)
 
 
-def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> Array:
+def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array) -> Array:
     """Return what holds n candidates, of `values`, in a pose, (V,) [N·m], shape (n,
     V)."""
+    # at rest neither dampers nor friction act
+    at_rest = [value for name, value in values.items() if name not in OF_MOTION]
+    first, alike = distinct(*at_rest)
     held: list[Array] = []
-    for first in range(0, n, arm.copies):
+    for begin in range(0, len(first), arm.copies):
         # the last group is filled with candidates that are there twice
-        some = np.resize(range(first, n), arm.copies)
+        some = np.resize(first[begin:], arm.copies)
         start = np.tile(pose, arm.copies)
         held.append(arm.start(values, some, start))
     balances = np.concatenate(held).reshape(-1, len(pose))
-    return balances[:n]
+    return balances[alike]
 
 
 def reading(angle: Array, sensors: Structs, period: float) -> Array:

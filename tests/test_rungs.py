@@ -1,5 +1,6 @@
 """A rung says which quantities its model lacks, and how finely it steps."""
 
+from dataclasses import replace
 from itertools import chain
 from typing import get_args
 
@@ -47,6 +48,8 @@ SWITCHED_ON = {
     "oil_frequency": 3.0,
     "oil_damping_share": 0.3,
     "trapped_pressure": 20.0,
+    "engine_exponent": 0.5,
+    "temperature_effect": 1.0,
 }
 """what is off by default, so that it can have an effect"""
 NAMES = [name for name in QUANTITIES if name in (JOINT.names or ())]
@@ -66,7 +69,8 @@ def acting(arm, spec) -> dict[str, set[str]]:
     command[20:, MOTOR] = 60
     pose = arm.pose("study")
     pose[CYLINDER] = arm.lower[CYLINDER]
-    log = at_rest(pose, command)
+    slow_and_warm = np.tile([0.8, 10.0], (len(command), 1))
+    log = replace(at_rest(pose, command), conditions=slow_and_warm)
     everyone = candidates(arm, 1 + len(NAMES))
     everyone.mass[:] = arm.masses
     everyone.joints[:] = nominal_joints(arm, HydraulicSettings(**SWITCHED_ON))

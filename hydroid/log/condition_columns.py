@@ -10,6 +10,8 @@ from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.clues import CLUES, column_unit, joint_of, number_in, words
 from hydroid.log.conditions import limits
+from hydroid.log.rates import FEWEST
+from hydroid.log.repair import MOST_LEFT_OUT
 from hydroid.log.table import Signal, Table
 from hydroid.settings.log import Input
 from hydroid.units import Unit
@@ -103,15 +105,19 @@ def condition_guess(
     if lacking:
         why = f"not used, for {listed(lacking, 2)} {'lack' if lacking[1:] else 'lacks'} it"
         return ConditionGuess(name, None, f"{about}, {why}")
-    values = np.concatenate([_values(table, column) for table in tables])
-    if not len(values):
-        return ConditionGuess(name, None, f"{about}, without a number")
+    of_logs = [_values(table, column) for table in tables]
+    if not all(map(len, of_logs)):
+        why = "not used, for too many of its cells hold no number"
+        return ConditionGuess(name, None, f"{about}, {why}")
+    values = np.concatenate(of_logs)
     reference = rounded(float(np.median(values)))
     unit = unit or _likely_unit(name, column, reference)
     low, high = limits(name, unit, reference)
     least = float(values.min())
     most = float(values.max())
     ends = f"{least:.4g} to {most:.4g} {unit}"
+    if least == most:
+        ends = f"always {least:.4g} {unit}"
     if low <= least and most <= high and (low > 0 or name != "engine_speed"):
         settings: Plain = {"column": column, "unit": unit, "reference": reference}
         return ConditionGuess(name, settings, f"{about}, {ends}")
@@ -125,13 +131,19 @@ def condition_guess(
 
 
 def _values(table: Table, name: str) -> Array:
-    """Return the numbers of a column."""
+    """Return the numbers of a column; none where too many cells hold none."""
     try:
         values = table.read([Signal(name, "condition")]).time
     except LogError:
         # a channel of a single message
         return np.empty(0)
-    return values[np.isfinite(values)]
+    there = np.isfinite(values)
+    steps = np.diff(np.flatnonzero(there))
+    # a slower channel has a number in every so many rows; `rates.join_rates` reads it
+    is_even = len(steps) >= FEWEST and steps.max() <= 3 * np.median(steps)
+    if there.mean() < 1.0 - MOST_LEFT_OUT and not is_even:
+        return np.empty(0)
+    return values[there]
 
 
 def _likely_unit(name: Input, column: str, median: float) -> str:

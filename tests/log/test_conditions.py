@@ -292,9 +292,29 @@ def test_a_column_is_recognised_by_its_name_and_its_unit(tmp_path, name):
         assert guess.settings["reference"] == pytest.approx(np.median(values), rel=1e-3)
 
 
-@pytest.mark.parametrize("speed", [np.where(SPEED < 1000, 0.0, SPEED), 0.0 * SPEED])
-def test_an_engine_that_is_off_at_times_is_not_used_and_that_is_said(tmp_path, speed):
+UNUSED = {
+    "off at times": np.where(SPEED < 1000, 0.0, SPEED),
+    "off": 0.0 * SPEED,
+    "a sensor that fails": np.where(np.arange(ROWS) % 40 < 12, np.nan, SPEED),
+    "words": ["idle"] * ROWS,
+}
+
+
+@pytest.mark.parametrize("why", UNUSED)
+def test_a_column_that_no_fit_can_read_is_not_used_and_that_is_said(tmp_path, why):
+    speed = UNUSED[why]
     table = open_table(written(tmp_path / "a.csv", engine_rpm=speed))
     (guess,) = guess_conditions([table], (), table.names[:5])
     assert guess.settings is None
     assert "not used" in guess.reason
+
+
+def test_a_slower_channel_is_recognised_and_read(tmp_path):
+    """A bus gives the engine's speed in every fifth row."""
+    cells = [f"{one:.1f}" if k % 5 == 0 else "" for k, one in enumerate(SPEED)]
+    path = written(tmp_path / "a.csv", engine_rpm=cells)
+    (guess,) = guess_conditions([open_table(path)], (), ["time_s"])
+    log, _ = read(path, engine_speed=guess.settings)
+    assert log is not None
+    expected = SPEED[: len(log.time)] / guess.settings["reference"]
+    np.testing.assert_allclose(log.conditions[:, 0], expected, rtol=1e-3)

@@ -120,8 +120,8 @@ class Plant:
         candidate = Bindings(settings).candidates(identified.theta[None])
         if conditions:
             engine, warmer = relative_to(settings.log, conditions)
-            joints = under_conditions(candidate.joints, engine, warmer)
-            candidate = Candidates(joints, candidate.mass)
+            warmed = under_conditions(candidate.joints, engine, warmer)
+            candidate = Candidates(warmed, candidate.mass)
         self._candidate = candidate
         if settings.stage == "hyd":
             _refuse_without_force(self._candidate, identified.source)

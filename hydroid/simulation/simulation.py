@@ -12,7 +12,7 @@ changes a bit.
 import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple
@@ -321,7 +321,7 @@ class Simulation:
 
 
 @contextmanager
-def _mapping(threads: int) -> Iterator[Callable[..., Iterable[Any]]]:
+def _mapping(threads: int) -> Generator[Callable[..., Iterable[Any]]]:
     """Yield what maps a function over arguments in some threads; one is this one."""
     if threads == 1:
         yield map

@@ -247,7 +247,7 @@ def error_section(
 
 def _error_row(
     error: AngleError, verdict: JointVerdict | None, shown: Display
-) -> dict[str, float | None]:
+) -> dict[str, Any]:
     """Return the error model of a joint, and what unseen logs show of it, as the joint is
     shown."""
     measured = None

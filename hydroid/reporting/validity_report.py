@@ -86,7 +86,7 @@ def covered(settings: FitSettings, logs: Sequence[Log], joint: int) -> Covered:
     commands = np.concatenate([log.command_of(joint) for log in logs])
     measured = [log for log in logs if log.measures(joint)]
     ends = np.full((3, 2), np.nan)
-    ends[0] = commands.min(), commands.max()
+    ends[0] = commands.min(initial=0.0), commands.max(initial=0.0)
     if measured:
         angles = np.concatenate([log.angle_of(joint) for log in measured])
         speeds = np.concatenate([_speeds(log, joint) for log in measured])

@@ -167,10 +167,8 @@ def _beyond(speed: CurveEstimate, commands: Array) -> str:
     below = speed.at[0] < ends["negative"] - ONE_SIZE
     if not above and not below:
         return ""
-    return (
-        f"Beyond {ends['negative']:.0f} and {ends['positive']:+.0f} %, which the logs reach, "
-        "all is extrapolated."
-    )
+    reached = f"{ends['negative']:.0f} and {ends['positive']:+.0f} %".replace("-", "−")
+    return f"The logs reach {reached}; beyond, all is extrapolated."
 
 
 def _sides(name: str, summary: FitSummary) -> dict[str, str]:

@@ -15,7 +15,7 @@ from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.parameters_report import held_masses, sentence
 from hydroid.settings.fit import FitSettings
 from hydroid.units import Display
-from hydroid.words import interval_words, listed, two_digits, value_words
+from hydroid.words import interval_words, listed, significant, two_digits, value_words
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as
@@ -48,9 +48,9 @@ _ERRORS = (
     "the sensor. Empty: none persists."
 )
 _MEASURED_ERRORS = (
-    " Measured: the same on the unseen logs, as in the table of verdicts. What it exceeds the "
-    "expected error by comes from inexact parameters, from the model, and from whatever differs in "
-    "these logs. The bands count inexact parameters as well."
+    " Measured: the same on the unseen logs, as in the table of verdicts. It is larger "
+    "than expected where parameters or the model err, or where something differs in these logs. "
+    "The bands allow for inexact parameters."
 )
 ELSEWHERE = ("combination", "error lasts")
 """findings that another section of the page shows better"""
@@ -218,9 +218,9 @@ def error_section(
         shown = settings.arm.joint(joint).shown
         row = _error_row(error, by_joint.get(joint), shown)
         rows.append({"joint": name, "unit": shown.unit, **row})
-        said = f"{name} {two_digits(row[EXPECTED])} {shown.unit}"
+        said = f"{name} {significant(row[EXPECTED], 2)} {shown.unit}"
         if row[MEASURED] is not None:
-            said += f" (measured {two_digits(row[MEASURED])})"
+            said += f" (measured {significant(row[MEASURED], 2)})"
         after.append(said)
         if row[INSIDE] is not None:
             held.append(f"{name} {two_digits(row[INSIDE])} %")

@@ -13,20 +13,19 @@ from hydroid.settings.fit import FitSettings
 from hydroid.words import interval_words, three_digits, value_words
 
 _CARRIED = (
-    "In the middle of the logged travel of each joint, with the other joints where the first log "
-    "starts. Gravity: what holds the joint there, and then the least and the largest of it along "
-    "the logged travel. Inertia: of all that moves with the joint. “Given” are values that the arm's "
-    "file and fixed parameters give, and the logs did not change."
+    "Each joint in the middle of its logged travel; the other joints stand where the first log "
+    "starts. Gravity is what holds the joint, inertia that of all that moves with it. Given: it "
+    "follows from the arm's file and fixed parameters."
 )
 _LOADED = (
-    " The load of the second table is what holds the joint in this pose. Changes are those of the "
-    "speed from the load as it is to twice the load, with 95 % intervals."
+    " Second table: the load is what holds the joint in this pose. The change is that of its speed "
+    "from this load to twice the load, with a 95 % interval."
 )
 _LEAKS = (
-    " Leakage makes a joint creep under its load while the valve is shut. A fixed leakage was not "
-    "estimated: `hydroid suggest` tests whether the logs show another one."
+    " Leakage lets a joint creep under its load while the valve is shut. The fit does not estimate "
+    "a fixed leakage: hydroid suggest tests whether the logs show another one."
 )
-_CARRIED_HEADER = ("joint", "pose", "gravity", "inertia")
+_CARRIED_HEADER = ("joint", "pose", "gravity", "along the travel", "inertia")
 _LEAKAGE_HEADER = ("leakage of the valve", "speed with the valve shut")
 _LOADED_HEADER = (
     "joint",
@@ -124,9 +123,10 @@ def _carried_row(settings: FitSettings, one: UnderLoad) -> tuple[Cell, ...]:
     slides = settings.arm.joint(one.joint).slides
     forces, masses = ("N", "kg") if slides else ("N·m", "kg·m²")
     low, high = map(three_digits, one.over_travel)
-    gravity = f"{_known(one.gravity, forces)}; along the travel {low} to {high}"
+    gravity = _known(one.gravity, forces)
+    along = f"{low} to {high} {forces}"
     inertia = _known(one.inertia, masses)
-    return settings.arm.name_of(one.joint), one.pose, gravity, inertia
+    return settings.arm.name_of(one.joint), one.pose, gravity, along, inertia
 
 
 def _known(known: Known, unit: str) -> str:

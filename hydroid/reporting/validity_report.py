@@ -7,6 +7,7 @@ parameters, `hydroid suggest` computes.
 import math
 import shlex
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,14 +37,14 @@ HEADER = (
     "unit",
     "commands [%]",
     "positions",
-    "of the range",
+    "part of the range",
     "speeds [per s]",
     "driven [s]",
 )
 _TEXT = (
     "What the fitted logs cover of each joint. Beyond it the model extrapolates. Positions are "
-    f"angles, or of a joint that slides its way. Speeds are means over {OVER:g} s. Driven: with "
-    "positive and with negative commands."
+    f"angles, or the way of a joint that slides. Speeds are means over {OVER:g} s. Driven: time "
+    "with positive and with negative commands."
 )
 
 
@@ -78,6 +79,14 @@ class Covered:
         if math.isinf(high - low):
             return None
         return float(np.ptp(self.ends[1]) / (high - low))
+
+
+class Lack(NamedTuple):
+    """What logs lack in a word, where they lack it, and why it matters."""
+
+    what: str
+    where: str
+    why: str
 
 
 def covered(settings: FitSettings, logs: Sequence[Log], joint: int) -> Covered:
@@ -133,8 +142,8 @@ def validity_section(run: FinishedRun) -> Section:
     valid = [f"{one.joint} {_commands(one)} %, {_positions(one)}" for one in joints]
     answer = f"valid for {listed(valid)}"
     if lacks:
-        answer += f"; log next: {'; '.join(what for what, _ in lacks)}"
-    points = [f"Log next: {what}. {why}" for what, why in lacks]
+        answer += f"; log next: {listed([one.what for one in lacks])}"
+    points = [f"Log next: {one.what}{one.where}. {one.why}" for one in lacks]
     points.append(
         "Which parameter an experiment would narrow, and whether to weigh or to measure instead: "
         f"hydroid suggest --fit {shlex.quote(run.folder)}. The experiment itself: hydroid design."
@@ -149,48 +158,49 @@ def validity_section(run: FinishedRun) -> Section:
     )
 
 
-def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[tuple[str, str]]:
-    """Yield what logs lack of single joints, and why it matters."""
+def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[Lack]:
+    """Yield what logs lack of single joints."""
     never = [one.joint for one in joints if len(one.smallest) < len(SIGNS)]
     if never:
-        yield (
-            f"both directions of {listed(never)}",
-            "The logs command one of them only.",
-        )
+        why = "The logs command one of them only."
+        yield Lack("both directions", f" of {listed(never)}", why)
     low = [f"{one.joint} (now {_commands(one)} %)" for one in joints if _is_weak(one)]
     if low:
-        yield f"larger commands of {listed(low)}", "Speeds beyond are extrapolated."
+        yield Lack(
+            "larger commands", f" of {listed(low)}", "Beyond, speeds are extrapolated."
+        )
     fast = [
         f"{one.joint} (now from {_least(one)} %)" for one in joints if _is_fast(one)
     ]
     if fast:
         why = "They show where the dead band ends."
-        yield f"smaller commands of {listed(fast)}", why
+        yield Lack("smaller commands", f" of {listed(fast)}", why)
     narrow = list[str]()
     for one in joints:
         if one.share is not None and one.share < MOST_TRAVEL:
-            narrow.append(f"{one.joint} (now {100 * one.share:.0f} % of the range)")
+            narrow.append(f"{one.joint} (now {100 * one.share:.0f} % of its range)")
     if narrow:
         why = "Gravity, inertia and the cylinder's lever change with the pose."
-        yield f"other poses of {listed(narrow)}", why
+        yield Lack("other poses", f" of {listed(narrow)}", why)
 
 
-def _lacks_of_logs(run: FinishedRun, logs: Sequence[Log]) -> Iterator[tuple[str, str]]:
-    """Yield what the logs of a run lack as a whole, and why it matters."""
+def _lacks_of_logs(run: FinishedRun, logs: Sequence[Log]) -> Iterator[Lack]:
+    """Yield what the logs of a run lack as a whole."""
     outputs = [joint - 1 for joint in run.settings.outputs]
     moving = np.vstack(
         [np.abs(log.command[:, outputs]) >= LEAST_COMMAND for log in logs]
     )
     count = moving.sum(axis=1)
-    if len(outputs) > 1 and np.mean(count[count > 0] > 1) < TOGETHER:
-        yield "several joints at once", "They share pump and inertia."
+    several = np.sum(count > 1)
+    if len(outputs) > 1 and several < TOGETHER * np.sum(count > 0):
+        yield Lack("several joints at once", "", "They share pump and inertia.")
     unseen = sum(not prediction.apart for prediction in run.validations.values())
     if unseen < LEAST_BLOCKS:
         why = f"There {'is' if unseen == 1 else 'are'} {unseen or 'none'}."
-        yield f"unseen logs, {LEAST_BLOCKS} or more, to validate on", why
+        yield Lack("more unseen logs", f", {LEAST_BLOCKS} in all, to validate on", why)
     if not run.settings.payloads:
-        why = "No log has a payload, so what one does is predicted by the model alone."
-        yield "a known load at the tip, if the machine is to carry any", why
+        why = "No log has a payload: what one does, the model alone says."
+        yield Lack("a known load", " at the tip, if the machine is to carry any", why)
 
 
 def _is_weak(one: Covered) -> bool:

@@ -50,7 +50,7 @@ def test_what_the_logs_lack_is_what_to_log_next():
     # the elbow's commands have one size in each direction: its valve is on or off
     assert "larger commands of shoulder (now 0 to +50 %)." in said
     assert "smaller commands of shoulder (now from +30 %)." in said
-    assert "unseen logs, 4 or more, to validate on. There are none." in said
+    assert "more unseen logs, 4 in all, to validate on. There are none." in said
     assert "several joints at once" not in said
     assert "hydroid suggest --fit RUN" in said
 

@@ -149,7 +149,7 @@ def _mean_absolute(predictions: Sequence[Prediction], joint: int) -> float | Non
 def _quantities(summary: FitSummary) -> list[Figures]:
     return [
         {
-            "label": one.label,
+            "label": one.said,
             "unit": one.unit,
             "value": _rounded(one.value),
             "interval": [*map(_rounded, ends)],

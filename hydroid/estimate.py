@@ -106,6 +106,16 @@ class QuantityEstimate(Settings):
     """standard deviation, in the unit of the value; null: not determined"""
     interval: Interval = (None, None)
     """95 % interval"""
+    reach: float | None = None
+    """largest command of the logs in its direction [%], where it is of a larger one;
+    null: the logs have its command"""
+
+    @property
+    def said(self) -> str:
+        """The label, and that the quantity is extrapolated if it is."""
+        if self.reach is None:
+            return self.label
+        return f"{self.label} (extrapolated: the logs reach {self.reach:.0f} %)"
 
     @property
     def within(self) -> float:
@@ -167,6 +177,20 @@ class AngleError(Settings):
     lasts_s: NotNegative = 0.0
     """time for which what is left of the error lasts [s]; 0: it is as the error model
     says"""
+
+    def change_deg(self, seconds: float) -> float:
+        """Return the standard deviation of how far the angle seems to move in a time
+        beyond what is predicted, whatever the parameters, at the logs' mean speed [deg].
+
+        The sensor's noise is in it at both ends.
+        """
+        noise = self.sensor_deg**2
+        lasting = self.lasting_deg**2
+        # `after_10_s_deg` has noise, lasting error and drift, each once
+        drift = max(self.after_10_s_deg**2 - noise - lasting, 0.0)
+        gone = 1.0 - math.exp(-seconds / self.lasting_s)
+        variance = 2.0 * noise + 2.0 * lasting * gone + drift * seconds / 10.0
+        return math.sqrt(variance)
 
     @property
     def numbers(self) -> tuple[float, ...]:

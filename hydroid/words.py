@@ -92,6 +92,18 @@ def interval_words(low: float | None, high: float | None) -> str:
     return f"{first} to {last}"
 
 
+def value_words(value: float, low: float | None, high: float | None) -> str:
+    """Write a value with three significant digits, or as many as tell it from both ends
+    of its interval."""
+    rough = three_digits(value)
+    if low is None or high is None or not math.isfinite(value):
+        return rough
+    of_width = _decimals(high - low)
+    if of_width > len(rough.partition(".")[2]):
+        return f"{value:.{of_width}f}"
+    return rough
+
+
 def time_words(seconds: float) -> str:
     """Write how long something took, with the unit that suits: "40 s", "14 min", "2.3
     h"."""

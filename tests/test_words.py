@@ -1,11 +1,18 @@
 """Every row of words can be filled, and a sentence agrees with its subjects."""
 
+import math
 from string import Formatter
 
 import pytest
 
 from hydroid.findings import WORDS, Finding
-from hydroid.words import interval_words, listed, printable, told_apart
+from hydroid.words import (
+    interval_words,
+    listed,
+    printable,
+    told_apart,
+    value_words,
+)
 
 FIELDS = Formatter().parse
 """the fields of a text to be filled, each with the letters before it"""
@@ -99,3 +106,21 @@ def test_an_interval_shows_two_digits_of_its_width_and_of_its_ends(
     low, high, expected: str
 ):
     assert interval_words(low, high) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "expected"),
+    [
+        (12.3849, 12.373, 12.397, "12.385"),
+        (383.2, 265.0, 501.0, "383"),
+        (0.01264, 0.0064, 0.0249, "0.0126"),
+        (9.134, 8.994, 9.276, "9.13"),
+        (-25.1004, -25.143, -25.058, "-25.100"),
+        (4.56789, None, 5.0, "4.57"),
+        (math.nan, 0.0, 1.0, "–"),
+    ],
+)
+def test_a_value_has_as_many_digits_as_tell_it_from_the_ends_of_its_interval(
+    value: float, low: float | None, high: float | None, expected: str
+):
+    assert value_words(value, low, high) == expected

@@ -122,9 +122,9 @@ def fit_hyd(
         out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is
             written].
         mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values. The
-            masses are fixed at these values. Without it, masses that are parameters of
-            the settings are estimated too, unless they are fixed there. All others are
-            those of the arm's file.
+            masses are fixed at these values. Without it, the masses are those of the
+            arm's file, and a mass that is a parameter of the settings is estimated,
+            unless they fix it.
 
     Raises:
         HydroidError: an input or a folder that cannot be used.

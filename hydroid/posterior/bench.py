@@ -58,7 +58,7 @@ class Bench:
 
     `angle`: at which it is tested [rad]; `period` between samples [s]; `scenario`: the
     joint alone; `only`: size of the commands in positive and in negative direction [%],
-    None where they have several.
+    None where they have several; `reach`: size of the largest ones [%].
     """
 
     settings: FitSettings
@@ -67,12 +67,19 @@ class Bench:
     period: float
     scenario: Scenario
     only: tuple[float | None, float | None] = (None, None)
+    reach: tuple[float, float] = (100.0, 100.0)
 
     def tells(self, command: float) -> bool:
         """Return whether the logs tell what a command [%] does: all but between on and
         off."""
         only = self.only[0 if command > 0 else 1]
         return only is None or abs(abs(command) - only) <= ONE_SIZE
+
+    def beyond(self, command: float) -> float | None:
+        """Return the size of the logs' largest command in the direction of one [%] that
+        is clearly larger; None of one that the logs have."""
+        reach = self.reach[0 if command > 0 else 1]
+        return reach if abs(command) > reach + ONE_SIZE else None
 
     @property
     def unit(self) -> tuple[float, str]:
@@ -228,7 +235,9 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     alone = settings.changed({"simulation.other_joints": "locked"})
     scenario = make_scenario(load_model(arm), rest, [joint - 1], alone)
     only = (only_command(logs, joint, 1.0), only_command(logs, joint, -1.0))
-    return Bench(settings, joint, middle, period, scenario, only)
+    commands = np.concatenate([log.command_of(joint) for log in logs])
+    reach = (float(max(commands.max(), 0.0)), float(max(-commands.min(), 0.0)))
+    return Bench(settings, joint, middle, period, scenario, only, reach)
 
 
 def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:

@@ -13,7 +13,8 @@ class Column(NamedTuple):
 
     name: plain ASCII. label: the same in words. positive: it cannot be negative, and
     its interval is multiplicative. at: where the point of a curve is, `along` what; the
-    points of a curve share their name. step, moves: as `CurveEstimate` has them.
+    points of a curve share their name. step, moves: as `CurveEstimate` has them. reach:
+    as `QuantityEstimate` has it.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Column(NamedTuple):
     along: str = "command [%]"
     step: float | None = None
     moves: str = ""
+    reach: float | None = None
 
 
 Measured: TypeAlias = Iterator[tuple[Column, Array]]

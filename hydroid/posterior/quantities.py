@@ -28,9 +28,11 @@ from hydroid.posterior.bench import (
 )
 from hydroid.posterior.column import Column, Measured
 from hydroid.posterior.curves import StepCurves, opening_curve, step_curves
-from hydroid.posterior.posterior import Estimated
+from hydroid.posterior.posterior import Estimated, Posterior
 from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem
+from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Candidates
 
 Measure = Callable[[Candidates], Measured]
@@ -76,22 +78,31 @@ def quantities(problem: Problem, uncertainty: Uncertainty) -> Quantities:
     return scalars, curves
 
 
-def _joint_quantities(
-    problem: Problem, uncertainty: Uncertainty, joint: int
-) -> Quantities:
-    """Return the quantities of one joint, numbered from 1."""
-    candidates = problem.bindings.candidates
-    estimate = candidates(uncertainty.theta[None])
-    measure = joint_measure(make_bench(problem.settings, problem.logs, joint), estimate)
-    columns = [column for column, _ in measure(estimate)]
+def known_columns(
+    settings: FitSettings, posterior: Posterior, joint: int, measure: Measure
+) -> tuple[list[Column], Estimated]:
+    """Return the quantities of one joint, numbered from 1, that a measure gives, and
+    what a posterior knows of them."""
+    candidates = Bindings(settings).candidates
+    columns = [column for column, _ in measure(candidates(posterior.box.at[None]))]
 
     def values(theta: Array) -> Array:
         return np.stack([value for _, value in measure(candidates(theta))], axis=1)
 
-    parameters = problem.settings.parameters.values()
+    parameters = settings.parameters.values()
     concerned = np.array([p.joints is None or joint in p.joints for p in parameters])
     positive = np.array([column.positive for column in columns])
-    estimated = uncertainty.posterior.propagate(values, positive, concerned)
+    return columns, posterior.propagate(values, positive, concerned)
+
+
+def _joint_quantities(
+    problem: Problem, uncertainty: Uncertainty, joint: int
+) -> Quantities:
+    """Return the quantities of one joint, numbered from 1."""
+    settings = problem.settings
+    estimate = problem.bindings.candidates(uncertainty.theta[None])
+    measure = joint_measure(make_bench(settings, problem.logs, joint), estimate)
+    columns, estimated = known_columns(settings, uncertainty.posterior, joint, measure)
 
     joint_name = problem.settings.arm.name_of(joint)
     scalars = dict[str, QuantityEstimate]()
@@ -108,6 +119,7 @@ def _joint_quantities(
                 unit=column.unit,
                 sd=finite(estimated.sd[i]),
                 interval=finite_ends(estimated.interval[i]),
+                reach=column.reach,
             )
     curves = dict[str, CurveEstimate]()
     for name, rows in points.items():
@@ -163,7 +175,7 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
     further = gain_model
     if bench.settings.stage == "hyd":
         further = oil
-        for direction in _directions(bench, estimate):
+        for direction in directions(bench, estimate):
             tests.append(direction_test(bench, estimate, direction))
 
     def measure(candidates: Candidates) -> Measured:
@@ -183,7 +195,7 @@ def joint_measure(bench: Bench, estimate: Candidates) -> Measure:
     return measure
 
 
-def _directions(bench: Bench, estimate: Candidates) -> list[Direction]:
+def directions(bench: Bench, estimate: Candidates) -> list[Direction]:
     """Return both directions of a joint with the words that gravity gives them, or of
     one that slides its rod."""
     gravity = bench.weigh(estimate)[0][0]
@@ -317,7 +329,8 @@ class DirectionTest:
                 label = f"{figure.label}, {self.direction.word}"
                 if figure.what:
                     label = f"{figure.what} {self.direction.when}: {figure.label}"
-                yield Column(name, label, figure.unit), figure.value
+                reach = self.bench.beyond(self.direction.sign * figure.command)
+                yield Column(name, label, figure.unit, reach=reach), figure.value
 
     def _steady_figures(
         self, candidates: Candidates, speed: dict[float, Array]
@@ -361,7 +374,7 @@ def direction_test(
     steady = towards * bench.steady(estimate, commands, bench.loads(estimate))[0]
     planned = dict(zip(COMMANDS, steady, strict=True))
     told = [size for size in COMMANDS if bench.tells(direction.sign * size)]
-    step = bench.movement(direction.sign * _rise(planned, told), LASTS)
+    step = bench.movement(direction.sign * largest_told(planned, told), LASTS)
     return DirectionTest(
         bench=bench,
         direction=direction,
@@ -373,7 +386,7 @@ def direction_test(
     )
 
 
-def _rise(planned: Mapping[float, float], told: Sequence[float]) -> float:
+def largest_told(planned: Mapping[float, float], told: Sequence[float]) -> float:
     """Return the command of a step [%]: the smallest from 50 % that clearly moves the
     joint, or the largest, of those that are told."""
     for size in told:

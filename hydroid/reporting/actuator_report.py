@@ -11,6 +11,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
+from hydroid.log.command_sizes import ONE_SIZE
 from hydroid.reporting.actuator_tables import (
     RESPONSE_HEADER,
     bandwidth,
@@ -30,6 +31,8 @@ STILL = 20.0
 """by how much a command that stands still may change [%]: a joystick never rests"""
 AT_END = 0.02
 """part of a joint's travel in the logs within which it may stand at a stop"""
+Words = Mapping[str, str]
+"""what commands of a direction do with a joint, by the direction"""
 TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
 """endings of curves, as `posterior.quantities` names directions, and their colours"""
 
@@ -81,15 +84,19 @@ def speed_section(
         draw = partial(_speed_chart, name, (speed, opening), sides, commands, cloud)
         caption = f"{name}: {speed.label}"
         tabs.append(Plot(f"speed_{len(tabs) + 1}", caption, draw, button=name))
-        fastest.append(f"{name} {_fastest(speed, commands)}")
+        words = {to: direction_word(summary, name, to) for to in TOWARDS}
+        fastest.append(_fastest(name, speed, commands, words))
         if opening is not None:
             shut.append(f"{name} {_dead_bands(settings, summary, joint)}")
-        cards[f"speed_{name}"] = speed_table(name, speed, opening, cloud)
+        table = speed_table(name, speed, opening, cloud)
+        note = _beyond(speed, commands)
+        cards[f"speed_{name}"] = replace(table, note=note)
     if not tabs:
         return None
     title = "Speed against command"
     text = _SPEED_ALONE
-    answer = f"fastest: {listed(fastest)}"
+    fastest = [*filter(None, fastest)]
+    answer = f"speed at the largest commands of the logs: {'; '.join(fastest)}"
     if shut:
         title = "Valve: dead band, opening, and speed against command"
         text = _SPEED
@@ -131,15 +138,37 @@ def _dead_band(
     return getattr(settings.hydraulics, of_side), False
 
 
-def _fastest(speed: CurveEstimate, commands: Array) -> str:
-    """Write the highest speed, and whether it lies beyond the commands of the logs."""
-    top = max(range(len(speed.at)), key=lambda i: abs(speed.value[i]))
-    said = f"{two_digits(abs(speed.value[top]))} {speed.unit}"
-    at = speed.at[top]
-    logged = commands.max(initial=0.0) if at > 0 else commands.min(initial=0.0)
-    if abs(at) > abs(logged) + 1.0:
-        said += f" (at {abs(at):.0f} %; the logs reach {abs(logged):.0f} %)"
-    return said
+def _fastest(name: str, speed: CurveEstimate, commands: Array, words: Words) -> str:
+    """Write the speeds of a joint at the largest commands of the logs, in both
+    directions."""
+    said = list[str]()
+    for towards, largest in _largest(commands).items():
+        if largest:
+            size = abs(np.interp(largest, speed.at, speed.value))
+            word = words[towards] or towards
+            top = f"{two_digits(float(size))} {speed.unit}"
+            said.append(f"{word} {top} at {largest:+.0f} %".replace("-", "−"))
+    return f"{name} {', '.join(said)}" if said else ""
+
+
+def _largest(commands: Array) -> dict[str, float]:
+    """Return the largest commands of the logs in both directions [%]."""
+    return {
+        "positive": float(commands.max(initial=0.0)),
+        "negative": float(commands.min(initial=0.0)),
+    }
+
+
+def _beyond(speed: CurveEstimate, commands: Array) -> str:
+    """Say where a curve goes beyond the commands of the logs; nothing where it does
+    not."""
+    ends = _largest(commands)
+    above = speed.at[-1] > ends["positive"] + ONE_SIZE
+    below = speed.at[0] < ends["negative"] - ONE_SIZE
+    if not above and not below:
+        return ""
+    reached = f"{ends['negative']:.0f} and {ends['positive']:+.0f} %".replace("-", "−")
+    return f"The logs reach {reached}; beyond, all is extrapolated."
 
 
 def _sides(name: str, summary: FitSummary) -> dict[str, str]:

@@ -8,7 +8,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
 from hydroid.reporting.page import Cell, Table
-from hydroid.words import interval_words, three_digits, two_digits
+from hydroid.words import interval_words, three_digits, two_digits, value_words
 
 EVERY = 10.0
 """commands of the table of speeds [%]"""
@@ -42,7 +42,8 @@ def speed_table(
             continue
         # a valve that stays shut has no interval, and its speed no sign
         stands = low == high == 0.0
-        row: list[Cell] = [f"{command:+.0f}", "0" if stands else three_digits(value)]
+        said = "0" if stands else value_words(value, low, high)
+        row: list[Cell] = [f"{command:+.0f}", said]
         row.append(None if stands else interval_words(low, high))
         row.append(_median(command, measured, least))
         if opening is not None:
@@ -116,5 +117,5 @@ def _quantity(quantity: QuantityEstimate | None) -> str | None:
     if quantity is None:
         return None
     between = interval_words(*quantity.interval)
-    value = three_digits(quantity.value)
+    value = value_words(quantity.value, *quantity.interval)
     return f"{value} ({between})" if between else value

@@ -1,29 +1,57 @@
 """What a fit knows of the machine, what it does not know, and how sure a prediction can
 be."""
 
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from hydroid.estimate import FitSummary, QuantityEstimate
+from hydroid.estimate import AngleError, FitSummary, QuantityEstimate
 from hydroid.findings import Finding
+from hydroid.fitting.validation import HORIZONS
+from hydroid.fitting.verdict import THE_FIT
 from hydroid.joint_verdict import JointVerdict
 from hydroid.reporting.page import Cell, Section, Table
-from hydroid.reporting.parameters_report import sentence
+from hydroid.reporting.parameters_report import held_masses, sentence
 from hydroid.settings.fit import FitSettings
-from hydroid.words import interval_words, listed, three_digits, two_digits
+from hydroid.units import Display
+from hydroid.words import interval_words, listed, significant, two_digits, value_words
 
 BEST_WITHIN = 0.3
 """half of a 95 % interval, relative to the value, up to which a property counts as
 known"""
-MOST_KNOWN = 5
-"""quantities of a joint that a page shows"""
+MOST_KNOWN = 4
+"""quantities of a joint that a page shows, beside its speeds and how it swings"""
+ANY_WIDTH = ("natural_frequency", "damping_ratio")
+"""ends of the names of quantities that are stated however wide their intervals are:
+whether an arm swings for long, a wide one tells, too"""
+COMMAND = re.compile(r"_\d+(?=_|$)")
+"""command in the name of a quantity"""
 VARIANT = re.compile(r"_(positive|negative|\d+)(?=_|$)")
 """direction and command in the name of a quantity: without them it is its kind's"""
 MOST_UNKNOWN = 6
 MOST_WARNINGS = 3
+AHEAD = 10.0
+"""time of a prediction whose error is expected [s]"""
+EXPECTED = f"expected after {AHEAD:g} s"
+MEASURED = f"measured after {AHEAD:g} s"
 INSIDE = "unseen samples inside the 95 % bands [%]"
-"""name of a column"""
+"""names of columns"""
+_SURE = (
+    "Even with exact parameters a prediction is uncertain, because not only the commands "
+    "move the joints. These other influences add up over time."
+)
+_ERRORS = (
+    "Expected: rms error of how far a joint moves in this time, if parameters and model were "
+    "exact. It has the sensor's noise, at both ends, and what the fitted logs show of other "
+    "influences, at the mean speed there. An error that persists comes from the model, not from "
+    "the sensor. Empty: none persists."
+)
+_MEASURED_ERRORS = (
+    " Measured: the same on the unseen logs, as in the table of verdicts. It is larger "
+    "than expected where parameters or the model err, or where something differs in these logs. "
+    "The bands allow for inexact parameters."
+)
 ELSEWHERE = ("combination", "error lasts")
 """findings that another section of the page shows better"""
 
@@ -35,14 +63,14 @@ def warnings(summary: FitSummary) -> tuple[Finding, ...]:
 
 
 def unknown_section(settings: FitSettings, summary: FitSummary) -> Section:
-    """Return the section of the other findings.
+    """Return the section of the other findings, and of masses that are held.
 
-    Those after the first six stand with the parameters.
+    Findings after the first six stand with the parameters.
     """
     shown = _others(summary)[:MOST_UNKNOWN]
-    points = tuple(sentence(finding, settings) for finding in shown)
+    points = [sentence(finding, settings) for finding in shown]
     none = "" if points else "The logs determine every free parameter."
-    return Section("What is not known", none, points)
+    return Section("What is not known", none, (*points, *held_masses(settings)))
 
 
 def further_findings(summary: FitSummary) -> tuple[str, ...]:
@@ -58,25 +86,16 @@ def _others(summary: FitSummary) -> list[Finding]:
 
 def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     """Return the section with a card of the best known quantity of each kind for each
-    joint.
+    joint, of the speed in both directions.
 
     None without any.
     """
     cards = dict[str, Table]()
     for joint in settings.outputs:
-        of_joint = [
-            (VARIANT.sub("", name), quantity)
-            for name, quantity in summary.quantities.items()
-            if quantity.joint == joint and quantity.within <= BEST_WITHIN
-        ]
-        of_joint.sort(key=lambda pair: pair[1].within)
-        best = dict[str, QuantityEstimate]()
-        for kind, quantity in of_joint:
-            best.setdefault(kind, quantity)
         rows = list[tuple[Cell, ...]]()
-        for quantity in [*best.values()][:MOST_KNOWN]:
-            value = three_digits(quantity.value)
-            rows.append((quantity.label, value, quantity.unit, _within(quantity)))
+        for quantity in _best_known(summary, joint):
+            value = value_words(quantity.value, *quantity.interval)
+            rows.append((quantity.said, value, quantity.unit, _within(quantity)))
         name = settings.arm.name_of(joint)
         if rows:
             header = ("quantity", "value", "unit", "interval")
@@ -89,24 +108,55 @@ def quantity_section(settings: FitSettings, summary: FitSummary) -> Section | No
     return Section("What is known", text, cards=cards) if cards else None
 
 
+def _best_known(summary: FitSummary, joint: int) -> list[QuantityEstimate]:
+    """Return the best known quantity of each kind of a joint: speeds, then the others,
+    the most precise first, then how the arm swings on its oil."""
+    best = dict[str, QuantityEstimate]()
+    for name, quantity in summary.quantities.items():
+        kind = VARIANT.sub("", name)
+        if quantity.joint != joint or not _is_known(kind, quantity):
+            continue
+        # both directions: whether they differ is the first that is asked
+        if kind.endswith("_speed"):
+            kind = COMMAND.sub("", name)
+        known = best.setdefault(kind, quantity)
+        best[kind] = min(known, quantity, key=_doubt)
+    speeds = [one for kind, one in best.items() if "_speed_" in kind]
+    swings = [one for kind, one in best.items() if kind.endswith(ANY_WIDTH)]
+    others = [one for one in best.values() if one not in (*speeds, *swings)]
+    others.sort(key=_doubt)
+    return [*speeds, *others[:MOST_KNOWN], *swings]
+
+
+def _is_known(kind: str, quantity: QuantityEstimate) -> bool:
+    """Return whether a page states a quantity as known."""
+    if kind.endswith(ANY_WIDTH):
+        return quantity.within < math.inf
+    return quantity.within <= BEST_WITHIN
+
+
+def _doubt(quantity: QuantityEstimate) -> tuple[bool, float]:
+    """Return what orders quantities: extrapolated ones last, and the most precise
+    first."""
+    return quantity.reach is not None, quantity.within
+
+
 def every_quantity_section(
     settings: FitSettings, summary: FitSummary
 ) -> Section | None:
     """Return the folded section with all quantities of the compared joints.
 
-    None without any.
+    None without any. `quantity_table` has more digits.
     """
     rows = list[tuple[Cell, ...]]()
-    for joint in settings.outputs:
-        name = settings.arm.name_of(joint)
-        for quantity in summary.quantities.values():
-            if quantity.joint == joint:
-                value = quantity.value, quantity.unit, *quantity.interval
-                rows.append((name, quantity.label, *value))
+    for name, quantity in _by_joint(settings, summary):
+        value = value_words(quantity.value, *quantity.interval)
+        between = interval_words(*quantity.interval)
+        rows.append((name, quantity.said, value, quantity.unit, between))
     if not rows:
         return None
-    header = ("joint", "quantity", "value", "unit", "from", "to")
-    note = "from, to: 95 % interval; empty: no limit."
+    header = ("joint", "quantity", "value", "unit", "95 %")
+    note = "95 %: confidence interval; empty: no limit."
     text = (
         "What follows from the parameters of each joint. Quantities that are parameters "
         "themselves, such as the dead band of a pilot stage, are in the table of parameters."
@@ -116,24 +166,47 @@ def every_quantity_section(
     return Section("All quantities", text, tables=tables, folded=True, answer=answer)
 
 
+def quantity_table(settings: FitSettings, summary: FitSummary) -> Table:
+    """Return all quantities of the compared joints with every digit, for a file."""
+    rows = list[tuple[Cell, ...]]()
+    for name, quantity in _by_joint(settings, summary):
+        value = quantity.value, quantity.unit, *quantity.interval
+        rows.append((name, quantity.said, *value))
+    header = ("joint", "quantity", "value", "unit", "from", "to")
+    return Table("", header, tuple(rows))
+
+
+def _by_joint(
+    settings: FitSettings, summary: FitSummary
+) -> Iterator[tuple[str, QuantityEstimate]]:
+    """Yield the names of the compared joints with each of their quantities."""
+    for joint in settings.outputs:
+        for quantity in summary.quantities.values():
+            if quantity.joint == joint:
+                yield settings.arm.name_of(joint), quantity
+
+
 def _within(quantity: QuantityEstimate) -> str:
-    """Write an interval: of a percentage its ends, since ± 3 % of 40 % could mean
-    either."""
+    """Write an interval: of a percentage, or one that is wide, its ends, since ± 3 % of
+    40 % could mean either."""
     low, high = quantity.interval
-    if quantity.unit == "%" and low is not None and high is not None:
+    has_ends = low is not None and high is not None
+    if has_ends and quantity.unit == "%":
         return f"{interval_words(low, high)} %"
+    if has_ends and quantity.within > BEST_WITHIN:
+        return interval_words(low, high)
     return f"± {100 * quantity.within:.2g} %"
 
 
 def error_section(
     settings: FitSettings, summary: FitSummary, verdicts: Sequence[JointVerdict] = ()
 ) -> Section | None:
-    """Return the folded section with the error model of each compared joint, and how
-    often the bands held what was measured in unseen logs.
+    """Return the folded section with the error model of each compared joint, beside what
+    unseen logs show of it.
 
     None where the run has none.
     """
-    inside = {verdict.joint: verdict.inside_percent for verdict in verdicts}
+    by_joint = {verdict.joint: verdict for verdict in verdicts}
     rows = list[dict[str, Any]]()
     after = list[str]()
     held = list[str]()
@@ -143,44 +216,52 @@ def error_section(
             continue
         name = settings.arm.name_of(joint)
         shown = settings.arm.joint(joint).shown
-        unit = shown.unit
-        factor = shown.of_degrees(1.0)
-        ahead = factor * error.after_10_s_deg
-        after.append(f"{name} {two_digits(ahead)} {unit}")
-        share = inside.get(joint)
-        if share is not None:
-            held.append(f"{name} {two_digits(share)} %")
-        rows.append(
-            {
-                "joint": name,
-                "unit": unit,
-                "sensor's noise": factor * error.sensor_deg,
-                "uncertain after 10 s": ahead,
-                "error persists for [s]": error.lasts_s or None,
-                INSIDE: share,
-            }
-        )
+        row = _error_row(error, by_joint.get(joint), shown)
+        rows.append({"joint": name, "unit": shown.unit, **row})
+        said = f"{name} {significant(row[EXPECTED], 2)} {shown.unit}"
+        if row[MEASURED] is not None:
+            said += f" (measured {significant(row[MEASURED], 2)})"
+        after.append(said)
+        if row[INSIDE] is not None:
+            held.append(f"{name} {two_digits(row[INSIDE])} %")
     if not rows:
         return None
-    text = (
-        "Even with exact parameters a prediction is uncertain, because not only the commands "
-        "move the joints. These other influences add up over time."
-    )
-    note = (
-        "Standard deviations. After 10 s: of a joint that moves at the mean speed of the logs. "
-        "An error that persists comes from the model, not from the sensor. Empty: none persists."
-    )
     columns = {name: name for name in rows[0]}
-    answer = f"standard deviation after 10 s: {listed(after)}"
+    answer = f"{EXPECTED}: {listed(after)}"
+    note = _ERRORS
     if held:
         answer += f"; unseen samples inside the 95 % bands: {listed(held)}"
+        note += _MEASURED_ERRORS
     else:
-        del columns[INSIDE]
+        for name in (MEASURED, INSIDE):
+            del columns[name]
     table = Table.of("", columns, rows, note)
     return Section(
         "How sure can a prediction be?",
-        text,
+        _SURE,
         tables={"prediction_errors": table},
         folded=True,
         answer=answer,
     )
+
+
+def _error_row(
+    error: AngleError, verdict: JointVerdict | None, shown: Display
+) -> dict[str, Any]:
+    """Return the error model of a joint, and what unseen logs show of it, as the joint is
+    shown."""
+    measured = None
+    inside = None
+    if verdict is not None:
+        inside = verdict.inside_percent
+        ahead = verdict.horizons_deg.get(THE_FIT, ())
+        by_time = dict(zip(HORIZONS, ahead, strict=False))
+        measured = by_time.get(AHEAD)
+    factor = shown.of_degrees(1.0)
+    return {
+        "sensor's noise": factor * error.sensor_deg,
+        EXPECTED: factor * error.change_deg(AHEAD),
+        MEASURED: None if measured is None else factor * measured,
+        "error persists for [s]": error.lasts_s or None,
+        INSIDE: inside,
+    }

@@ -16,7 +16,8 @@ from hydroid.reporting.chart import Chart, Mark, Panel
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.naming import belongs_to, named, quantity_and_side
-from hydroid.words import interval_words, listed, three_digits
+from hydroid.settings.parameters import nominal_value
+from hydroid.words import interval_words, listed, three_digits, value_words
 
 WHAT_IT_IS = ("joint", "side", "quantity", "symbol", "value", "unit")
 """columns with which every table of parameters begins"""
@@ -26,6 +27,8 @@ NO_LIMITS = (None, None)
 """interval without an end"""
 FARTHEST = 5.0
 """standard deviations of the prior up to which a posterior is drawn"""
+OTHERWISE = 0.1
+"""part of a mass by which one that is held differs noticeably from the arm's file"""
 MOST_ALIKE = 3
 """parameters of the same words that a sentence names"""
 ROW = 16
@@ -59,21 +62,46 @@ def parameter_section(
             f"settings, {supply} bar."
         )
     tables = {"parameters": short_table(settings, summary)}
-    answer = known_of_free(summary)
-    said = (*_at_bounds(summary), *points)
+    at_bounds = _at_bounds(summary)
+    answer = f"{known_of_free(summary)}; at a bound: {at_bounds or 'none'}"
+    said = [*held_masses(settings), *points]
+    if at_bounds:
+        said.insert(0, f"At a bound: {at_bounds}.")
     return Section(
-        "Parameters", text, said, tables, folded=True, answer=answer, printed=True
+        "Parameters",
+        text,
+        tuple(said),
+        tables,
+        folded=True,
+        answer=answer,
+        printed=True,
     )
 
 
-def _at_bounds(summary: FitSummary) -> tuple[str, ...]:
-    """Say which parameters are at a bound, all in one sentence."""
+def _at_bounds(summary: FitSummary) -> str:
+    """Name the parameters at a bound; nothing where there are none."""
     names = list[str]()
     for name, estimate in summary.estimate.items():
         if estimate.at_bound:
             value = three_digits(estimate.value)
             names.append(f"{name} ({estimate.at_bound}, {value})")
-    return (f"At a bound: {listed(names)}.",) if names else ()
+    return listed(names) if names else ""
+
+
+def held_masses(settings: FitSettings) -> list[str]:
+    """Say which masses a fit holds at other values than the arm's file has."""
+    said = list[str]()
+    for name, parameter in settings.parameters.items():
+        held = parameter.fixed
+        if parameter.quantity != "mass" or held is None:
+            continue
+        expected = nominal_value(settings.arm, settings.hydraulics, parameter)
+        if expected and abs(held - expected) > OTHERWISE * expected:
+            said.append(
+                f"This fit holds the {named(settings, name)} at {three_digits(held)} kg; "
+                f"the arm's file says {three_digits(expected)} kg."
+            )
+    return said
 
 
 def known_of_free(summary: FitSummary) -> str:
@@ -116,8 +144,9 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         row = _what_it_is(settings, name, estimate)
         row["side"] = _side_and_word(settings, name, summary)
         # what a search leaves of 0 is 0
-        if estimate.sd and abs(estimate.value) < 1e-9 * estimate.sd:
-            row["value"] = 0.0
+        is_zero = estimate.sd and abs(estimate.value) < 1e-9 * estimate.sd
+        value = 0.0 if is_zero else estimate.value
+        row["value"] = value_words(value, *estimate.interval)
         row["unit"] = estimate.unit
         row["interval"] = interval_words(*estimate.interval)
         row["by log"] = interval_words(*estimate.interval_by_log)

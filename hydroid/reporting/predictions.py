@@ -21,9 +21,11 @@ from hydroid.reporting.knowledge_report import (
     every_quantity_section,
     further_findings,
     quantity_section,
+    quantity_table,
     unknown_section,
     warnings,
 )
+from hydroid.reporting.load_report import load_section
 from hydroid.reporting.oil_report import oil_section
 from hydroid.reporting.page import Page, Section, short_name
 from hydroid.reporting.parameters_report import (
@@ -35,6 +37,7 @@ from hydroid.reporting.parameters_report import (
 from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.response_report import error_table, response_section
 from hydroid.reporting.search_report import search_section
+from hydroid.reporting.validity_report import validity_section
 from hydroid.reporting.verdict_table import (
     Verdicts,
     horizon_section,
@@ -129,6 +132,7 @@ def fit_page(run: FinishedRun) -> Page:
         data=_search_data(run),
         files={
             "parameters": parameter_table(settings, run.summary),
+            "quantities": quantity_table(settings, run.summary),
             "errors": error_table(shown, settings.arm, one_fit=True),
         },
         made_from=_made_from(run),
@@ -142,17 +146,20 @@ def _fit_sections(
     settings = run.settings
     summary = run.summary
     fitted = run.result.fitted
+    logs = [prediction.log for prediction in fitted]
     step = next_step(summary, run.verdict, run.folder, fitted)
     sections = (
         *verdict_sections(fits, step),
         *prediction_sections(shown, settings.arm, fits),
         quantity_section(settings, summary),
         error_section(settings, summary, run.verdict),
+        validity_section(run),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
         oil_section(settings.arm, shown),
-        speed_section(settings, summary, [prediction.log for prediction in fitted]),
+        speed_section(settings, summary, logs),
         step_section(settings, summary),
+        load_section(run.model, logs),
         every_quantity_section(settings, summary),
         parameter_section(settings, summary, *further_findings(summary)),
         prior_section(settings, summary),

@@ -1,4 +1,4 @@
-"""How the search went: its learning curve, the Pareto set, and what each refinement
+"""Whether the optimum was reached: the learning curve, the Pareto set, and what each refinement
 took."""
 
 from collections.abc import Mapping, Sequence
@@ -55,7 +55,7 @@ def search_section(run: FinishedRun) -> Section:
         steps = [f"{step} {time_words(took)}" for step, took in run.seconds.items()]
         points.append(f"Time: {listed(steps)}.")
     return Section(
-        "How the search went",
+        "Was the optimum reached?",
         points=tuple(points),
         plots=tuple(plots),
         folded=True,
@@ -64,14 +64,34 @@ def search_section(run: FinishedRun) -> Section:
 
 
 def _answer(run: FinishedRun) -> str:
-    """Say what the fit took in all."""
-    answers = list[str]()
+    """Say whether the optimum was reached, and what the fit took in all."""
+    answers = [_reached(run)]
     if run.seconds:
         answers.append(f"it took {time_words(sum(run.seconds.values()))}")
     simulations = sum(effort.simulations for effort in run.result.refinements)
     if simulations:
         answers.append(f"{simulations:,} simulations of the refinement")
     return "; ".join(answers)
+
+
+def _reached(run: FinishedRun) -> str:
+    """Say whether a fit ended at an optimum: no, where its end, its starts or simple
+    models speak against it."""
+    summary = run.summary
+    if summary.converged is None:
+        return "not known: the search alone was run"
+    if not summary.converged:
+        return f"no: {summary.ending}"
+    by_kind = {finding.kind: listed(finding.subjects) for finding in summary.findings}
+    for kind, joints in by_kind.items():
+        if kind.startswith("behind nine numbers"):
+            return f"no, or the model is wrong: nine numbers fit the logs better in {joints}"
+    if joints := by_kind.get("several optima"):
+        return f"yes, the best of several at which the starts of {joints} ended"
+    said = f"yes: {summary.ending}"
+    if any(len(ended) > 1 for ended in run.result.starts.values()):
+        said += "; all starts ended there"
+    return said
 
 
 def _refined(run: FinishedRun, effort: Effort) -> str:

@@ -107,6 +107,13 @@ class FinishedRun:
     validations: Mapping[str, Prediction]
 
     @property
+    def model(self) -> IdentifiedModel:
+        """The final estimate with the settings."""
+        values = self.summary.values
+        theta = self.settings.parameter_set().vector(values, self.folder)
+        return IdentifiedModel(self.settings, theta, self.folder, self.summary)
+
+    @property
     def seed(self) -> int:
         """Seed of the search."""
         return self.settings.search.seed

@@ -8,6 +8,7 @@ import pytest
 from report_fits import make_fit, make_problem, make_record
 
 from hydroid.estimate import Covariance
+from hydroid.findings import Finding
 from hydroid.fitting.summary import summarise
 from hydroid.fitting.validation import fitted
 from hydroid.log import Log
@@ -69,11 +70,20 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     section = speed_section(SETTINGS, SUMMARY, PROBLEM.logs)
     assert section is not None
     assert [tab.button for tab in section.tabs] == ["shoulder", "elbow"]
-    logged = PROBLEM.logs[0].command.min(axis=0)
-    assert section.answer == (
-        f"fastest: shoulder 24 deg/s (at 100 %; the logs reach {abs(logged[1]):.0f} %) "
-        f"and elbow 24 deg/s (at 100 %; the logs reach {abs(logged[2]):.0f} %)"
-    )
+    # linear between the curve's points: 0.24 deg/s per %
+    said = list[str]()
+    for joint, name in ((1, "shoulder"), (2, "elbow")):
+        ends = PROBLEM.logs[0].command[:, joint]
+        tops = [
+            f"{word} {0.24 * abs(end):.2g} deg/s at {sign}{abs(end):.0f} %"
+            for word, sign, end in (
+                ("positive", "+", ends.max()),
+                ("negative", "−", ends.min()),
+            )
+        ]
+        said.append(f"{name} {', '.join(tops)}")
+    start = "speed at the largest commands of the logs: "
+    assert section.answer == start + "; ".join(said)
     chart = section.tabs[0].make()
     labels = {mark.label for panel in chart.panels for mark in panel.marks}
     assert labels >= {
@@ -110,7 +120,7 @@ def test_the_valve_s_dead_bands_stand_beside_its_heading():
     section = speed_section(settings, summary, PROBLEM.logs)
     assert section is not None
     assert section.title.startswith("Valve: dead band")
-    said = "dead band: shoulder +12 and −8.5 % and elbow +0 and −5 % (fixed); fastest: "
+    said = "dead band: shoulder +12 and −8.5 % and elbow +0 and −5 % (fixed); speed"
     assert section.answer.startswith(said)
     stated = SUMMARY.quantities["shoulder_dead_band"].changed({"value": 15.0})
     quantities = {"shoulder_dead_band_positive": stated}
@@ -298,6 +308,25 @@ def test_only_a_search_over_generations_has_curves_of_it():
     assert {
         plot.name for plot in search_section(replace(record, result=once)).plots
     } == {"starts"}
+
+
+def test_whether_the_optimum_was_reached_is_said_beside_the_heading():
+    record = make_record(PROBLEM, FIT)
+    assert search_section(record).answer.startswith("yes: no step promises a gain")
+    stopped = {"converged": False, "ending": "its time was up"}
+    several = Finding("several optima", "note", ("elbow",))
+    behind = Finding("behind nine numbers", "warning", ("elbow",))
+    for changes, said in (
+        (stopped, "no: its time was up"),
+        ({"converged": None}, "not known"),
+        (
+            {"findings": (several,)},
+            "yes, the best of several at which the starts of elbow",
+        ),
+        ({"findings": (several, behind)}, "no, or the model is wrong: nine numbers"),
+    ):
+        other = replace(record, summary=record.summary.changed(changes))
+        assert search_section(other).answer.startswith(said)
 
 
 def test_a_profile_is_a_curve_with_the_line_that_ends_its_interval():

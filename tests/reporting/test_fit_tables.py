@@ -11,9 +11,15 @@ from report_fits import MODEL, make_fit, make_problem, make_record, make_uncerta
 from hydroid.commands.fit import fit_result
 from hydroid.estimate import QuantityEstimate
 from hydroid.findings import OF_OPTIMUM, Finding
-from hydroid.fitting import verdict
+from hydroid.fitting import verdict as verdict_of
 from hydroid.fitting.summary import summarise
-from hydroid.reporting.knowledge_report import error_section, every_quantity_section
+from hydroid.reporting.knowledge_report import (
+    error_section,
+    every_quantity_section,
+    quantity_section,
+    quantity_table,
+    unknown_section,
+)
 from hydroid.reporting.merged_report import merged_tables
 from hydroid.reporting.page import Table, log_names
 from hydroid.reporting.parameters_report import parameter_table
@@ -118,21 +124,43 @@ def test_how_sure_a_prediction_can_be_is_said_of_each_joint():
     problem = make_problem(outputs=(2, 3))
     summary = summarise(problem, make_fit(problem))
     one = summary.errors["q2"].changed(
-        {"sensor_deg": 0.05, "after_10_s_deg": 1.234, "lasts_s": 0.0}
+        {
+            "sensor_deg": 0.3,
+            "lasting_deg": 0.0,
+            "after_10_s_deg": 0.5,
+            "lasts_s": 0.0,
+        }
     )
-    two = one.changed({"after_10_s_deg": 0.5, "lasts_s": 1.4})
+    two = one.changed({"after_10_s_deg": 1.3, "lasts_s": 1.4})
     section = error_section(
         problem.settings, summary.changed({"errors": {"q2": one, "q3": two}})
     )
     assert section is not None
-    said = "standard deviation after 10 s: shoulder 1.2 deg and elbow 0.5 deg"
+    said = "expected after 10 s: shoulder 0.58 deg and elbow 1.3 deg"
     assert section.answer == said
     table = section.tables["prediction_errors"]
+    # how far a joint moves has the noise of both ends
+    expected = [np.hypot(0.3, after) for after in (0.5, 1.3)]
     assert table.rows == (
-        ("shoulder", "deg", 0.05, 1.234, None),
-        ("elbow", "deg", 0.05, 0.5, 1.4),
+        ("shoulder", "deg", 0.3, pytest.approx(expected[0]), None),
+        ("elbow", "deg", 0.3, pytest.approx(expected[1]), 1.4),
     )
     assert error_section(problem.settings, summary.changed({"errors": {}})) is None
+
+
+def test_what_is_expected_of_a_prediction_stands_beside_what_unseen_logs_show():
+    problem = make_problem()
+    fit = make_fit(problem)
+    summary = summarise(problem, fit)
+    (verdict,) = make_record(problem, fit).verdict
+    ahead = {verdict_of.THE_FIT: (0.1, 0.2, 0.3, 0.4, 7.25)}
+    seen = verdict.changed({"horizons_deg": ahead, "inside_percent": 91.0})
+    section = error_section(problem.settings, summary, [seen])
+    assert section is not None
+    assert "(measured 7.2)" in section.answer
+    assert section.answer.endswith("inside the 95 % bands: shoulder 91 %")
+    row = section.tables["prediction_errors"].rows[0]
+    assert row[4:] == (7.25, row[5], 91.0)
 
 
 def test_every_quantity_of_a_compared_joint_is_in_the_table():
@@ -150,9 +178,58 @@ def test_every_quantity_of_a_compared_joint_is_in_the_table():
         problem.settings, summary.changed({"quantities": made})
     )
     table = section.tables["quantities"]
-    assert table.rows == (("shoulder", "dead time", 0.1, "s", 0.08, None),)
+    assert table.rows == (("shoulder", "dead time", "0.1", "s", "from 0.08"),)
+    exact = quantity_table(problem.settings, summary.changed({"quantities": made}))
+    assert exact.rows == (("shoulder", "dead time", 0.1, "s", 0.08, None),)
     none = summary.changed({"quantities": {}})
     assert every_quantity_section(problem.settings, none) is None
+
+
+def known(label: str, value: float, half: float, **more: float) -> QuantityEstimate:
+    ends = (value - half, value + half)
+    return QuantityEstimate(
+        label=label, joint=2, value=value, unit="", interval=ends, **more
+    )
+
+
+def test_the_card_of_a_joint_has_both_directions_and_how_it_swings():
+    """An extrapolated quantity gives way to one that is not, and damping is stated
+    however wide its interval is."""
+    problem = make_problem()
+    summary = summarise(problem, make_fit(problem))
+    made = {
+        "shoulder_speed_50_positive": known("50 % up", 10.0, 1.0),
+        "shoulder_speed_100_positive": known("100 % up", 20.0, 0.01, reach=60.0),
+        "shoulder_speed_100_negative": known("100 % down", 25.0, 1.0, reach=60.0),
+        "shoulder_dead_time_positive": known("late up", 0.1, 0.02),
+        "shoulder_dead_time_negative": known("late down", 0.1, 0.01),
+        "shoulder_gain_positive": known("vague", 1.0, 0.9),
+        "shoulder_damping_ratio": known("damping", 0.1, 0.09),
+    }
+    section = quantity_section(problem.settings, summary.changed({"quantities": made}))
+    assert section is not None
+    rows = section.cards["known_shoulder"].rows
+    assert [(row[0], row[3]) for row in rows] == [
+        ("50 % up", "± 10 %"),
+        ("100 % down (extrapolated: the logs reach 60 %)", "± 4 %"),
+        ("late down", "± 10 %"),
+        ("damping", "0.010 to 0.19"),
+    ]
+
+
+def test_a_mass_that_is_held_at_another_value_than_the_arm_s_is_said():
+    problem = make_problem(fixed={"M1": 9.0})
+    summary = summarise(problem, make_fit(problem))
+    said = unknown_section(problem.settings, summary).points[-1]
+    assert said.startswith(
+        "This fit holds the mass (link1: M1) at 9 kg; the arm's file"
+    )
+    own = make_problem(fixed={"M1": 4.6})
+    assert not [
+        point
+        for point in unknown_section(own.settings, summary).points
+        if "holds" in point
+    ]
 
 
 def test_what_is_left_of_an_error_and_lasts_is_a_finding():
@@ -219,7 +296,7 @@ def test_a_fit_whose_time_was_up_gives_no_advice_that_holds_only_of_an_optimum(
     monkeypatch: pytest.MonkeyPatch, ending: Ending
 ) -> None:
     lagging = [Finding("behind nine numbers", "warning", ("shoulder",))]
-    monkeypatch.setattr(verdict, "behind", lambda *_: lagging)
+    monkeypatch.setattr(verdict_of, "behind", lambda *_: lagging)
     problem = make_problem()
     fit = make_fit(problem)
     stopped = replace(fit.refinements["refined"], ending=ending)

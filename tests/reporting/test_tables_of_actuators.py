@@ -43,9 +43,9 @@ def test_speeds_stand_at_every_tenth_per_cent_beside_the_median_of_measured_ones
         "valve [mm²]",
     )
     assert table.rows == (
-        ("-20", "-8", "-8.8 to -7.2", None, None),
+        ("-20", "-8.0", "-8.8 to -7.2", None, None),
         ("+10", "0", None, None, "0"),
-        ("+20", "9", "8.1 to 9.9", "8.5", "4"),
+        ("+20", "9.0", "8.1 to 9.9", "8.5", "4"),
     )
 
 

@@ -1,0 +1,257 @@
+"""Where a fit holds: the commands, angles and speeds of its logs; and what to log next.
+
+What a log should add follows from what the logs lack. What it would bring for single
+parameters, `hydroid suggest` computes.
+"""
+
+import math
+import shlex
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hydroid.arrays import Array, record
+from hydroid.fitting.comparison import LEAST_BLOCKS
+from hydroid.log import Log
+from hydroid.log.command_sizes import only_command
+from hydroid.log.log import LEAST_COMMAND
+from hydroid.reporting.actuator_report import OVER
+from hydroid.reporting.page import Cell, Section, Table
+from hydroid.run.record import FinishedRun
+from hydroid.settings.fit import FitSettings
+from hydroid.units import Display
+from hydroid.words import listed
+
+LARGE = 90.0
+"""largest command from which a direction counts as driven to its end [%]"""
+SMALL = 25.0
+"""smallest command up to which a direction counts as driven slowly [%]"""
+MOST_TRAVEL = 0.7
+"""part of a joint's range that logs should cover"""
+TOGETHER = 0.1
+"""part of the driven time in which several joints should move"""
+SIGNS = {1.0: "+", -1.0: "−"}
+HEADER = (
+    "joint",
+    "unit",
+    "commands [%]",
+    "positions",
+    "part of the range",
+    "speeds [per s]",
+    "driven [s]",
+)
+_TEXT = (
+    "What the fitted logs cover of each joint. Beyond it the model extrapolates. Positions are "
+    f"angles, or the way of a joint that slides. Speeds are means over {OVER:g} s. Driven: time "
+    "with positive and with negative commands."
+)
+
+
+@record
+class Covered:
+    """What some logs cover of a joint.
+
+    Attributes:
+        joint: its name.
+        shown: how it is shown.
+        ends: smallest and largest commands [%], angles [rad] or positions [m], and
+            speeds, shape (3, 2).
+        smallest: smallest command that is none of a lever's noise [%], by its sign;
+            none of a direction without commands.
+        switched: signs of the commands that are on or off.
+        seconds: with positive and with negative commands [s].
+        range: of the joint [rad], [m]; infinite where it has no end.
+    """
+
+    joint: str
+    shown: Display
+    ends: Array
+    smallest: dict[float, float]
+    switched: tuple[float, ...]
+    seconds: tuple[float, float]
+    range: tuple[float, float]
+
+    @property
+    def share(self) -> float | None:
+        """Part of the range that the logs cover; None: it has no end."""
+        low, high = self.range
+        if math.isinf(high - low):
+            return None
+        return float(np.ptp(self.ends[1]) / (high - low))
+
+
+class Lack(NamedTuple):
+    """What logs lack in a word, where they lack it, and why it matters."""
+
+    what: str
+    where: str
+    why: str
+
+
+def covered(settings: FitSettings, logs: Sequence[Log], joint: int) -> Covered:
+    """Return what logs cover of a joint, numbered from 1."""
+    arm = settings.arm
+    commands = np.concatenate([log.command_of(joint) for log in logs])
+    measured = [log for log in logs if log.measures(joint)]
+    ends = np.full((3, 2), np.nan)
+    ends[0] = commands.min(initial=0.0), commands.max(initial=0.0)
+    if measured:
+        angles = np.concatenate([log.angle_of(joint) for log in measured])
+        speeds = np.concatenate([_speeds(log, joint) for log in measured])
+        ends[1] = angles.min(), angles.max()
+        ends[2] = speeds.min(), speeds.max()
+    smallest = dict[float, float]()
+    for sign in SIGNS:
+        sizes = sign * commands
+        sizes = sizes[sizes >= LEAST_COMMAND]
+        if len(sizes):
+            # a ramp passes small commands in no time
+            smallest[sign] = float(np.percentile(sizes, 5))
+    seconds = [
+        sum(
+            log.period * np.sum(sign * log.command_of(joint) >= LEAST_COMMAND)
+            for log in logs
+        )
+        for sign in SIGNS
+    ]
+    return Covered(
+        joint=arm.name_of(joint),
+        shown=arm.joint(joint).shown,
+        ends=ends,
+        smallest=smallest,
+        switched=tuple(s for s in SIGNS if only_command(logs, joint, s) is not None),
+        seconds=(float(seconds[0]), float(seconds[1])),
+        range=[*arm.ranges.values()][joint - 1],
+    )
+
+
+def _speeds(log: Log, joint: int) -> Array:
+    """Return the mean speeds of a joint over OVER, at every sample, (n,)."""
+    angle = log.angle_of(joint)
+    steps = min(max(round(OVER / log.period), 1), len(angle) - 1)
+    return (angle[steps:] - angle[:-steps]) / (steps * log.period)
+
+
+def validity_section(run: FinishedRun) -> Section:
+    """Return the folded section of what a fit's logs cover, and what to log next."""
+    settings = run.settings
+    logs = [prediction.log for prediction in run.result.fitted]
+    joints = [covered(settings, logs, joint) for joint in settings.outputs]
+    lacks = [*_lacks_of_joints(joints), *_lacks_of_logs(run, logs)]
+    valid = [f"{one.joint} {_commands(one)} %, {_positions(one)}" for one in joints]
+    answer = f"valid for {listed(valid)}"
+    if lacks:
+        answer += f"; log next: {listed([one.what for one in lacks])}"
+    points = [f"Log next: {one.what}{one.where}. {one.why}" for one in lacks]
+    points.append(
+        "Which parameter an experiment would narrow, and whether to weigh or to measure instead: "
+        f"hydroid suggest --fit {shlex.quote(run.folder)}. The experiment itself: hydroid design."
+    )
+    return Section(
+        "Range of validity, and what to log next",
+        _TEXT,
+        points=tuple(points),
+        tables={"covered": Table("", HEADER, tuple(map(_row, joints)))},
+        folded=True,
+        answer=answer,
+    )
+
+
+def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[Lack]:
+    """Yield what logs lack of single joints."""
+    never = [one.joint for one in joints if len(one.smallest) < len(SIGNS)]
+    if never:
+        why = "The logs command one of them only."
+        yield Lack("both directions", f" of {listed(never)}", why)
+    low = [f"{one.joint} (now {_commands(one)} %)" for one in joints if _is_weak(one)]
+    if low:
+        yield Lack(
+            "larger commands", f" of {listed(low)}", "Beyond, speeds are extrapolated."
+        )
+    fast = [
+        f"{one.joint} (now from {_least(one)} %)" for one in joints if _is_fast(one)
+    ]
+    if fast:
+        why = "They show where the dead band ends."
+        yield Lack("smaller commands", f" of {listed(fast)}", why)
+    narrow = list[str]()
+    for one in joints:
+        if one.share is not None and one.share < MOST_TRAVEL:
+            narrow.append(f"{one.joint} (now {100 * one.share:.0f} % of its range)")
+    if narrow:
+        why = "Gravity, inertia and the cylinder's lever change with the pose."
+        yield Lack("other poses", f" of {listed(narrow)}", why)
+
+
+def _lacks_of_logs(run: FinishedRun, logs: Sequence[Log]) -> Iterator[Lack]:
+    """Yield what the logs of a run lack as a whole."""
+    outputs = [joint - 1 for joint in run.settings.outputs]
+    moving = np.vstack(
+        [np.abs(log.command[:, outputs]) >= LEAST_COMMAND for log in logs]
+    )
+    count = moving.sum(axis=1)
+    several = np.sum(count > 1)
+    if len(outputs) > 1 and several < TOGETHER * np.sum(count > 0):
+        yield Lack("several joints at once", "", "They share pump and inertia.")
+    unseen = sum(not prediction.apart for prediction in run.validations.values())
+    if unseen < LEAST_BLOCKS:
+        why = f"There {'is' if unseen == 1 else 'are'} {unseen or 'none'}."
+        yield Lack("more unseen logs", f", {LEAST_BLOCKS} in all, to validate on", why)
+    if not run.settings.payloads:
+        why = "No log has a payload: what one does, the model alone says."
+        yield Lack("a known load", " at the tip, if the machine is to carry any", why)
+
+
+def _is_weak(one: Covered) -> bool:
+    """Return whether the logs lack large commands in a direction that they drive."""
+    driven = [sign for sign in one.smallest if sign not in one.switched]
+    sizes = {1.0: one.ends[0, 1], -1.0: -one.ends[0, 0]}
+    return any(sizes[sign] < LARGE for sign in driven)
+
+
+def _is_fast(one: Covered) -> bool:
+    """Return whether the logs lack small commands in a direction that they drive."""
+    driven = [sign for sign in one.smallest if sign not in one.switched]
+    return any(one.smallest[sign] > SMALL for sign in driven)
+
+
+def _commands(one: Covered) -> str:
+    low, high = one.ends[0]
+    return f"{_signed(low)} to {_signed(high)}"
+
+
+def _least(one: Covered) -> str:
+    signed = [f"{SIGNS[sign]}{size:.0f}" for sign, size in one.smallest.items()]
+    return listed(signed)
+
+
+def _positions(one: Covered) -> str:
+    low, high = one.shown.factor * one.ends[1]
+    if math.isnan(low):
+        return "not measured"
+    return f"{_minus(low)} to {_minus(high)} {one.shown.unit}"
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.0f}".replace("-", "−").replace("+0", "0")
+
+
+def _minus(value: float) -> str:
+    return f"{value:.0f}".replace("-", "−")
+
+
+def _row(one: Covered) -> tuple[Cell, ...]:
+    """Return what logs cover of a joint as a row of the table."""
+    slowest, fastest = one.shown.factor * one.ends[2]
+    share = "no ends" if one.share is None else f"{100 * one.share:.0f} %"
+    forward, backward = one.seconds
+    return (
+        one.joint,
+        one.shown.unit,
+        _commands(one),
+        _positions(one).removesuffix(f" {one.shown.unit}"),
+        share,
+        f"{_minus(slowest)} to {_minus(fastest)}",
+        f"{forward:.0f} and {backward:.0f}",
+    )

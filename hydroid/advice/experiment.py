@@ -101,7 +101,8 @@ class RandomExperiments:
         lower, upper = np.array([joint.limits for joint in arm.joints]).T
         inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
         self._lower = lower + inward
-        self._upper = upper - inward
+        # where the margins meet, rounding must not put the upper one below
+        self._upper = np.maximum(upper - inward, self._lower)
         self._samples = experiment_samples(settings)
         self._rest = round(limits.rest_s / period)
         self._shortest, self._longest = (

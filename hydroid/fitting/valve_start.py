@@ -216,6 +216,8 @@ class _Following:
         every = np.concatenate(angles)
         reach = (float(every.min()), float(every.max()))
         self._used = [inside(angle, reach) for angle in angles]
+        # to find where a log rests takes as long as to follow it
+        self._starts = [float(log.start[column]) for log in self._logs]
         self._noise = 1.0
 
     def fitted(self, delay: float) -> JointStart:
@@ -271,13 +273,13 @@ class _Following:
         """What has changed of the errors within MEMORY [rad], but near the ends of the
         travel, shape (T,)."""
         errors = list[Array]()
-        for log, used in zip(self._logs, self._used, strict=True):
+        every = zip(self._logs, self._used, self._starts, strict=True)
+        for log, used, start in every:
             command = log.command[:, self._column]
             is_back = command < 0
             # in samples
             delay = x[-2] / log.period
             lag = np.full(2, x[-1] / log.period)
-            start = float(log.start[self._column])
             way = self._speeds(x, command, is_back) * log.period
             angle = follow(way, is_back.astype(int), delay, lag, start, FREE)
             error = log.angle[:, self._column] - angle

@@ -108,9 +108,7 @@ def test_what_no_experiment_of_it_keeps_is_said_in_millimetres(
     tight = settings.changed({"design": settings.design.changed(limits)})
     values = {**TRUTH, "D": 2000.0}
     theta = tight.parameter_set().vector(values, "the truth")
-    with pytest.raises(
-        SettingsError, match=r"telescope nearer than 1047 mm to an end"
-    ):
+    with pytest.raises(SettingsError, match=r"telescope nearer than 1047 mm to an end"):
         design(tight, theta, [], 1, no_progress)
 
 

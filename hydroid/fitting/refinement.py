@@ -16,8 +16,9 @@ from hydroid.search.descent import (
     Ending,
     LinearModel,
     derivatives,
-    no_jacobian,
     start,
+    with_jacobian,
+    without_jacobian,
 )
 from hydroid.search.least_squares import UNDAMPED, step
 from hydroid.settings.search import RefinementSettings
@@ -53,11 +54,6 @@ class Refinement(Descent):
 
     numbers: Array
     negative_log: float = np.inf
-
-    @property
-    def without_jacobian(self) -> "Refinement":
-        """The refinement without its Jacobian, which is large."""
-        return replace(self, jacobian=no_jacobian(self.point))
 
 
 def refine(
@@ -103,7 +99,7 @@ def refine(
                 rows = _rows(likelihood, now)
         now = replace(now, negative_log=_at(likelihood, now).negative_log(now.residual))
         if now.ended and what.on_its_way:
-            now = now.without_jacobian
+            now = without_jacobian(now)  # it is large
         # else a start that itself may have been reached too late
         if moved or now.ended:
             keep(now.arrays)
@@ -154,7 +150,7 @@ def promised(likelihood: Likelihood, theta: Array, new: Mask) -> float:
     others = columns * ~new[parameters.free, None]
     left = list[float]()
     for slopes in (others, columns):
-        model = LinearModel(replace(begun, jacobian=slopes.T))
+        model = LinearModel(with_jacobian(begun, slopes.T))
         left.append(begun.cost - model.gain(model.step(UNDAMPED)))
     return 1.0 - left[1] / left[0]
 
@@ -204,10 +200,9 @@ def _with_new_numbers(
     rows = np.append(innovations, now.residual[innovations.size :])
     begun = start(now.point, rows)
     return replace(
-        now,
+        without_jacobian(now),
         residual=begun.residual,
         cost=begun.cost,
-        jacobian=begun.jacobian,
         fresh=False,
         slow=0,
         ending=Ending.UNDER_WAY,

@@ -20,7 +20,13 @@ from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.cylinder import GIVE, holding_pressures, rod_motion
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.oil import fills
-from hydroid.hydraulics.records import JOINT_STATE, NONE, Records, coefficients
+from hydroid.hydraulics.records import (
+    JOINT_STATE,
+    NONE,
+    Records,
+    coefficients,
+    unpacked,
+)
 from hydroid.hydraulics.solenoid import drive, resting_stroke
 
 # in chamber B at the start where neither settings nor log say [Pa]; ours
@@ -50,7 +56,7 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     The torque g(q) [N·m] is what the actuators must hold, or what a joint rests on
     where oil is trapped; both have the shape (n, J).
     """
-    c: Records = plugin.coefficients.view(np.recarray)
+    c = unpacked(plugin.coefficients)
     lever = rod_motion(angle, c)[1]
     stated = np.isfinite(c.start_pressure)
     level = np.where(stated, c.start_pressure, START_PRESSURE)
@@ -61,7 +67,7 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     pressure_a = np.where(rests, c.trapped_pressure, pressure_a)
     pressure_b = np.where(rests, level, pressure_b)
     fill_a, fill_b = fills(angle, c)
-    state = np.zeros(c.shape, JOINT_STATE)
+    state = np.zeros(plugin.coefficients.shape, JOINT_STATE)
     state["a"]["oil"] = pressure_a + c.bulk_modulus * fill_a
     state["b"]["oil"] = pressure_b + c.bulk_modulus * fill_b
     idle_drive = drive(0.0, c)
@@ -92,7 +98,7 @@ def pressures(coefficients: Structs, state: Structs, angle: Array) -> Array:
     coefficients of one candidate, shape (J,), n may as well be the samples of its
     record.
     """
-    c: Records = coefficients.view(np.recarray)
+    c = unpacked(coefficients)
     fill_a, fill_b = fills(angle, c)
     pressure_a = state["a"]["oil"] - c.bulk_modulus * fill_a
     pressure_b = state["b"]["oil"] - c.bulk_modulus * fill_b

@@ -3,6 +3,7 @@ about it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -104,7 +105,7 @@ class Log:
         """Time of the last sample [s]."""
         return float(self.time[-1])
 
-    @property
+    @cached_property
     def first_command(self) -> int:
         """Index of the first sample with a command; 0 where there is none.
 
@@ -138,7 +139,7 @@ class Log:
         # NaN, which is not larger than anything: not measured
         return not np.any(np.abs(later - earlier) > STANDS)
 
-    @property
+    @cached_property
     def start(self) -> Array:
         """The start pose [rad], shape (J,): the mean of the angles while the arm still
         rests, or `pose`.

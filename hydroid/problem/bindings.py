@@ -7,7 +7,7 @@ import numpy as np
 
 from hydroid.arrays import Array, Mask, record
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.records import Records, nominal_joints
+from hydroid.hydraulics.records import nominal_joints
 from hydroid.quantity_table import QUANTITIES, TARGETS
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
@@ -79,7 +79,7 @@ class Bindings:
         log of this name."""
         group = self._group_of(log)
         # what no parameter sets keeps its nominal value
-        joints: Records = np.tile(self._nominal, (len(theta), 1)).view(np.recarray)
+        joints = np.tile(self._nominal, (len(theta), 1))
         mass = np.tile(self._arm.masses, (len(theta), 1))
         for binding in self._bindings:
             table = mass
@@ -94,7 +94,7 @@ class Bindings:
                 changed = table[:, binding.targets] + value
                 least = quantity.lowest * quantity.factor
                 table[:, binding.targets] = np.maximum(changed, least)
-        return Candidates(joints, mass)
+        return Candidates(joints.view(np.recarray), mass)
 
     def refuse_idle(self, driven: Mask, outputs: Sequence[int]) -> None:
         """Refuse driven, (J,), or compared joints, 0-based, for which stage 1 has no

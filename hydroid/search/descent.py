@@ -1,9 +1,9 @@
 """Where least squares stands: the state between two steps, why it ended,
 and the residual's linear model."""
 
-from dataclasses import fields
+from dataclasses import field, fields, replace
 from enum import Enum
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,8 @@ class Descent:
         residual: there, shape (R,).
         cost: half the sum of its squares. cost_before: that of the start.
         jacobian: shape (R, p), or (0, p) where it is to be taken.
+        triangle: of the Jacobian's m columns with effect and the residual beside each
+            other, shape (m + 1, m + 1); (0, 0) without a Jacobian. It is not stored.
         fresh: whether the Jacobian is one of finite differences, not an updated one.
         cycle: cost, and number of evaluations, when the Jacobian was taken, shape (2,).
         damping: λ.
@@ -69,6 +71,7 @@ class Descent:
     cost: float
     cost_before: float
     jacobian: Array
+    triangle: Array = field(default_factory=lambda: np.empty((0, 0)))
     fresh: bool = False
     cycle: Array | tuple[float, int] = (np.inf, 0)
     damping: float = DAMPING
@@ -90,7 +93,7 @@ class Descent:
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return arrays by name, to be stored; without the residual once it has
         ended."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        values = {name: getattr(self, name) for name in self._stored()}
         values["ending"] = self.ending.name
         if self.ended:
             # the Jacobian is where the uncertainty begins
@@ -98,15 +101,25 @@ class Descent:
         return {name: np.asarray(value) for name, value in values.items()}
 
     @classmethod
+    def _stored(cls) -> list[str]:
+        return [field.name for field in fields(cls) if field.name != "triangle"]
+
+    @classmethod
     def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Self:
         """Return the descent that `arrays` stored; what a former version stored
         besides is left out."""
         values: dict[str, Any] = {}
-        for name in (field.name for field in fields(cls)):
+        for name in cls._stored():
             array = arrays[name]
             values[name] = array if array.ndim else array.item()
         values["ending"] = Ending[values["ending"]]
-        return cls(**values)
+        stored = cls(**values)
+        if stored.ended or not len(stored.jacobian):
+            return stored
+        return with_jacobian(stored, stored.jacobian)
+
+
+State = TypeVar("State", bound=Descent)
 
 
 def start(point: Array, residual: Array) -> Descent:
@@ -129,6 +142,19 @@ def no_jacobian(point: Array) -> Array:
     return np.empty((0, point.size))
 
 
+def without_jacobian(now: State) -> State:
+    """Return a descent whose next step takes a Jacobian."""
+    return replace(now, jacobian=no_jacobian(now.point), triangle=np.empty((0, 0)))
+
+
+def with_jacobian(now: State, jacobian: Array) -> State:
+    """Return a descent with the Jacobian at its point, shape (R, p)."""
+    moving = np.any(jacobian != 0.0, axis=0)
+    # factorised together with the residual: Q is then never formed
+    both = np.column_stack([jacobian[:, moving], now.residual])
+    return replace(now, jacobian=jacobian, triangle=triangle(both))
+
+
 class LinearModel:
     """The linear model r + J s of the residual around a descent's point,
     for the parameters with effect.
@@ -139,18 +165,22 @@ class LinearModel:
 
     def __init__(self, at: Descent) -> None:
         self.at = at
-        length = np.linalg.norm(at.jacobian, axis=0)
-        self.moving = np.flatnonzero(length > 0)
-        self.scale = length[self.moving]
-        self._triangle, self._right = self.reduced(at.residual)
+        self.moving = np.flatnonzero(np.any(at.jacobian != 0.0, axis=0))
+        m = len(self.moving)
+        self._triangle = at.triangle[:m, :m]
+        self._right = at.triangle[:m, m]
+        self.scale = np.linalg.norm(self._triangle, axis=0)
 
-    def reduced(self, row: Array) -> tuple[Array, Array]:
-        """Triangle R and vector b such that |row + J s|² is |b + R s|² and a constant."""
-        p = len(self.moving)
-        jacobian = self.at.jacobian[:, self.moving]
-        # factorised together: Q is then never formed
-        both = triangle(np.column_stack([jacobian, row]))
-        return both[:p, :p], both[:p, p]
+    def _right_of(self, row: Array) -> Array:
+        """Return the vector b such that |row + J s|² is |b + R s|² and a constant.
+
+        By the normal equations: what a row has beyond the residual need not be known
+        to the last digit.
+        """
+        slopes = (row - self.at.residual) @ self.at.jacobian[:, self.moving]
+        # R may be singular, and flat where the residual has few rows
+        beyond = np.linalg.lstsq(self._triangle.T, slopes, rcond=None)[0]
+        return self._right + beyond
 
     def step(
         self, damping: float, row: Array | None = None, *, held: int = NONE
@@ -159,10 +189,9 @@ class LinearModel:
 
         A parameter that is held does not move.
         """
-        triangle = self._triangle
         right = self._right
         if row is not None:
-            triangle, right = self.reduced(row)
+            right = self._right_of(row)
         size = np.linalg.norm(right)
         if not size:
             return np.zeros_like(right)
@@ -171,7 +200,7 @@ class LinearModel:
         unit = self.scale / size
         point = self.at.point[self.moving]
         damped = np.sqrt(damping) * np.eye(len(unit))
-        effects = np.where(self.moving == held, 0.0, triangle / self.scale)
+        effects = np.where(self.moving == held, 0.0, self._triangle / self.scale)
         matrix = np.vstack([effects, damped])
         target = np.append(-right / size, np.zeros(len(unit)))
         lower = -point * unit

@@ -36,7 +36,7 @@ What else differs from a textbook:
 """
 
 from dataclasses import replace
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,14 +48,14 @@ from hydroid.search.descent import (
     Descent,
     Ending,
     LinearModel,
+    State,
     costs,
     derivatives,
-    no_jacobian,
     start,
+    with_jacobian,
+    without_jacobian,
 )
 from hydroid.settings.search import RefinementSettings
-
-State = TypeVar("State", bound=Descent)
 
 UNDAMPED = 1e-14
 """λ of the step that tells what a Jacobian promises at most"""
@@ -125,7 +125,7 @@ def _differentiate(
         return replace(now, ending=Ending.JACOBIAN_FAILED)
     # against these a later, updated Jacobian is measured
     cycle = (now.cost, now.evaluations)
-    after = replace(now, jacobian=columns.T, fresh=True, cycle=cycle)
+    after = replace(with_jacobian(now, columns.T), fresh=True, cycle=cycle)
     model = LinearModel(after)
     # no damped step promises more than the undamped one
     most = model.gain(model.step(UNDAMPED))
@@ -161,7 +161,7 @@ def _advance(now: State, residuals: Function, settings: RefinementSettings) -> S
     after = replace(after, held=taken.held)
     if after.ended or not _keeps_jacobian(now, after, ratio):
         return after
-    return replace(after, jacobian=_updated(now, after))
+    return with_jacobian(after, _updated(now, after))
 
 
 def _tried(now: Descent, model: LinearModel, residuals: Function) -> list[_Try]:
@@ -206,7 +206,7 @@ def _without_gain(
 ) -> State:
     """Take a new Jacobian, or a shorter step, after a step that does not help."""
     if not now.fresh:
-        return replace(now, jacobian=no_jacobian(now.point))
+        return without_jacobian(now)
     after = replace(now, damping=HARDER * now.damping)
     promised = model.gain(model.step(after.damping))
     if promised >= settings.gain_tolerance * now.cost:
@@ -281,11 +281,10 @@ def _moved(
     # Nielsen's rule
     shrinking = max(1 / 3, 1 - (2 * ratio - 1) ** 3)
     return replace(
-        now,
+        without_jacobian(now),
         point=point,
         residual=row,
         cost=cost,
-        jacobian=no_jacobian(point),
         fresh=False,
         damping=max(now.damping * shrinking, UNDAMPED),
         slow=slow,
@@ -298,4 +297,4 @@ def _no_step(now: State) -> State:
     """End where no step is left, or first take anew a Jacobian that was updated."""
     if now.fresh:
         return replace(now, ending=Ending.NO_IMPROVEMENT)
-    return replace(now, jacobian=no_jacobian(now.point), damping=DAMPING)
+    return replace(without_jacobian(now), damping=DAMPING)

@@ -141,6 +141,7 @@ class SteppedArm:
         self.copies = copies
         self.model = copy(model)
         self.data = mujoco.MjData(model)
+        self._has_constants = False
         self._armature = model.dof_armature.copy()
         self._inertia = model.stat.meaninertia
         m = self.model
@@ -179,14 +180,21 @@ class SteppedArm:
         """
         model = self.model
         data = self.data
+        is_other = False
         for name, value in values.items():
             field = getattr(model, name)
             # its row stands before those of all copies
             world = len(field) % self.copies
             of_copies = field[world:]
-            of_copies[:] = value[rows, world:].reshape(of_copies.shape)
+            given = value[rows, world:].reshape(of_copies.shape)
+            if name.startswith("body_"):
+                is_other |= not np.array_equal(of_copies, given)
+            of_copies[:] = given
         model.dof_armature[:] = self._armature  # a rollout steps with another
-        mujoco.mj_setConst(model, data)
+        # what follows from the bodies; most candidates have those of the one before
+        if is_other or not self._has_constants:
+            mujoco.mj_setConst(model, data)
+            self._has_constants = True
         # constraints are solved as well whoever stands beside
         model.stat.meaninertia = self._inertia
         mujoco.mj_resetData(model, data)

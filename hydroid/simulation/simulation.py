@@ -12,9 +12,10 @@ changes a bit.
 import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from contextlib import contextmanager, suppress
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -50,6 +51,8 @@ class Oil(NamedTuple):
 
 TOGETHER = 56
 """joints of all arms stepped at once: MuJoCo computes with sparse matrices from 60"""
+OF_MOTION = ("dof_damping", "dof_frictionloss")
+"""fields of mjModel that do nothing to an arm at rest"""
 
 
 @record
@@ -100,6 +103,8 @@ class Simulation:
             scenario.machine, scenario.arm, scenario.roles, scenario.stepping
         )
         self.joints = self._chain.joints
+        # single arms that former candidates left
+        self._free = deque[SteppedArm]()
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
@@ -137,15 +142,10 @@ class Simulation:
     ) -> None:
         """Write what candidates do to their rows of a response."""
         # a stop is raised once the threads have ended; they begin nothing more meanwhile
-        with (
-            undisturbed() as stops,
-            quiet_mujoco(),
-            ThreadPoolExecutor(threads) as pool,
-        ):
+        with undisturbed() as stops, quiet_mujoco(), _mapping(threads) as run:
             copies = self._copies(candidates, threads)
-            # arms that no thread steps
-            free = deque(self._stepped(copies) for _ in range(threads))
-            ready = self._ready(candidates, free[0], pool.map)
+            free = self._arms(copies, threads)
+            ready = self._ready(candidates, free[0], run)
 
             def simulate(some: Index) -> None:
                 if stops:
@@ -156,14 +156,15 @@ class Simulation:
 
             groups = math.ceil(rows.size / copies)
             shares = np.array_split(range(rows.size), groups)
-            # a deque takes what the pool returns, so that errors are raised here
-            deque(pool.map(simulate, shares), maxlen=0)
+            # a deque takes what is returned, so that errors are raised here
+            deque(run(simulate, shares), maxlen=0)
             # one that diverges stops those beside it, which go again, each alone
             if copies > 1:
-                free = deque(self._stepped() for _ in range(threads))
+                free = self._arms(1, threads)
                 last = response.angle[rows, -1]
                 left = np.flatnonzero(np.isnan(last).any(axis=1))
-                deque(pool.map(simulate, left[:, None]), maxlen=0)
+                deque(run(simulate, left[:, None]), maxlen=0)
+            self._free.extend(free)
         # whoever took the signal goes on
         if stops:
             self._fill(response, rows, candidates, threads)
@@ -213,11 +214,22 @@ class Simulation:
         groups = max(threads, needed)
         return math.ceil(n / groups)
 
-    def _stepped(self, copies: int = 1) -> SteppedArm:
+    def _arms(self, copies: int, count: int) -> deque[SteppedArm]:
+        """Return so many arms, each with copies of it in one model, that nobody else
+        steps."""
+        arms = deque[SteppedArm]()
+        # other threads may simulate as well: who asks first how many there are may find
+        # none
+        with suppress(IndexError):
+            while copies == 1 and len(arms) < count:
+                arms.append(self._free.pop())
         model = self.scenario.arm.model
         if copies > 1:
             model = repeat(model, copies)
-        return self._chain.stepped(model, self.scenario.stepping.steps, copies)
+        steps = self.scenario.stepping.steps
+        while len(arms) < count:
+            arms.append(self._chain.stepped(model, steps, copies))
+        return arms
 
     def _ready(
         self,
@@ -234,7 +246,7 @@ class Simulation:
         n = len(candidates)
         values = scenario.values(candidates)
         pose = scenario.arm.pose
-        balance = _balance(arm, values, pose, n)
+        balance = _balance(arm, values, pose)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         before = np.zeros((plugin.past, len(chain.columns)))
         commands = np.concatenate([before, scenario.command[:, chain.columns]])
@@ -307,6 +319,16 @@ class Simulation:
         return torque.reshape(len(torque), -1)
 
 
+@contextmanager
+def _mapping(threads: int) -> Iterator[Callable[..., Iterable[Any]]]:
+    """Yield what maps a function over arguments in some threads; one is this one."""
+    if threads == 1:
+        yield map
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        yield pool.map
+
+
 def make_scenario(
     spec: mujoco.MjSpec, log: Log, outputs: list[int], settings: FitSettings
 ) -> Scenario:
@@ -350,17 +372,20 @@ def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
     return Oil(pressures(coefficients, history, angle), flow, line)
 
 
-def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array, n: int) -> Array:
+def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array) -> Array:
     """Return what holds n candidates, of `values`, in a pose, (V,) [N·m], shape (n,
     V)."""
+    # at rest neither dampers nor friction act
+    at_rest = [value for name, value in values.items() if name not in OF_MOTION]
+    first, alike = distinct(*at_rest)
     held: list[Array] = []
-    for first in range(0, n, arm.copies):
+    for begin in range(0, len(first), arm.copies):
         # the last group is filled with candidates that are there twice
-        some = np.resize(range(first, n), arm.copies)
+        some = np.resize(first[begin:], arm.copies)
         start = np.tile(pose, arm.copies)
         held.append(arm.start(values, some, start))
     balances = np.concatenate(held).reshape(-1, len(pose))
-    return balances[:n]
+    return balances[alike]
 
 
 def reading(angle: Array, sensors: Structs, period: float) -> Array:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import mujoco
@@ -175,6 +176,20 @@ def test_candidates_at_their_stops_or_diverging_change_no_bit_of_others(
     assert beyond.any(axis=(1, 2)).sum() > 1
     alone = [run(some[k : k + 1]).angle for k in range(8)]
     np.testing.assert_array_equal(together.angle, np.concatenate(alone))
+
+
+@pytest.mark.parametrize("stage", ["mech", "hyd"])
+def test_threads_may_simulate_the_same_log_at_once(spec, arm, study_log, stage):
+    """As those of a cluster's worker do."""
+    run = simulation(spec, arm, study_log, kind=stage, threads=1).simulate
+    some = candidates(arm, 6)
+    some.mass[:] *= np.linspace(0.9, 1.1, 6)[:, None]
+    parts = [some[k : k + 1] for k in range(6)] * 3
+    alone = [run(part).angle for part in parts]
+    assert np.isfinite(alone).all()
+    with ThreadPoolExecutor(4) as pool:
+        at_once = [response.angle for response in pool.map(run, parts)]
+    np.testing.assert_array_equal(at_once, alone)
 
 
 def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(

@@ -26,6 +26,8 @@ from hydroid.log import Log
 
 NAMES = ("standing still", "speed tables", "nine numbers")
 """of the baselines, the simplest first"""
+CLEARLY = 0.9
+"""part of another model's error on the fitted logs that a better one stays below"""
 BINS = 24
 """of commands from -100 to 100 %, in a table of speeds"""
 LONGEST_DELAY = 1.0

@@ -23,8 +23,9 @@ from operator import itemgetter
 import numpy as np
 from numpy.random import Generator
 
-from hydroid.fitting.baselines import NAMES, fit_baselines
+from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
+from hydroid.fitting.first_answer import first_answer
 from hydroid.fitting.refinement import Refining, refine
 from hydroid.fitting.step import Step
 from hydroid.fitting.valve_start import fitted_valve
@@ -32,6 +33,7 @@ from hydroid.parameters import Array
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.problem.problem import Problem
+from hydroid.progress import LOGGER, NOTE
 from hydroid.quantity_table import CURVE
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Population
@@ -131,7 +133,9 @@ class Multistart:
         for joint in lone_joints(self._problem):
             problem = alone(self._problem, joint, theta)
             step = Step("start", start=number + 1, joint=joint)
-            start = by_numbers(problem, joint, theta)
+            ends = [*problem.settings.arm.ranges.values()][joint - 1]
+            simple = fit_baselines(problem.logs, joint, ends)
+            start = by_numbers(problem, joint, theta, simple[NAMES[-1]])
             tried = [self._grown(problem, start, step.changed(numbers=True))]
             if not problem.leaves_noise(tried[0][1]):
                 tried.append(
@@ -141,6 +145,9 @@ class Multistart:
             # the other one seldom ends elsewhere
             _, near = min(tried, key=COST)
             result = self._fitted(make_likelihood(problem), near, step)
+            if number == 0:
+                said = first_answer(problem, joint, result[1], simple)
+                LOGGER.log(NOTE, "%s", said)
             best = self._best[joint] = min(
                 self._best.get(joint, result), result, key=COST
             )
@@ -231,11 +238,9 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
     )
 
 
-def by_numbers(problem: Problem, joint: int, theta: Array) -> Array:
+def by_numbers(problem: Problem, joint: int, theta: Array, found: Baseline) -> Array:
     """Return theta, (P,), with the valve of a joint whose speed follows the command
-    alone: nine numbers."""
-    ends = [*problem.settings.arm.ranges.values()][joint - 1]
-    found = fit_baselines(problem.logs, joint, ends)[NAMES[-1]]
+    alone: nine numbers, as they were found."""
     values = {"delay": found.delay, "pilot_lag": 0.0, "lag_of_speed": 1.0}
     rows = {"dead_band": 0, "opening_exponent": 1, "opening_lag": 3}
     for name, row in rows.items():

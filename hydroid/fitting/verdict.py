@@ -32,7 +32,7 @@ import numpy as np
 from hydroid.arrays import Array, record, rms
 from hydroid.estimate import finite
 from hydroid.findings import Finding
-from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
+from hydroid.fitting.baselines import CLEARLY, NAMES, Baseline, fit_baselines
 from hydroid.fitting.comparison import compare, in_blocks
 from hydroid.fitting.validation import HORIZONS, SETTLING, Prediction, errors_ahead
 from hydroid.joint_verdict import Comparison, JointVerdict, Outcome, Verdict
@@ -44,8 +44,6 @@ JUDGED = (1.0, 5.0, 10.0)
 [s]"""
 SHARE = 0.02
 """of a joint's travel that its error may be where no tolerance is stated"""
-CLEARLY = 0.9
-"""part of another model's error on the fitted logs that a better one stays below"""
 LEAST_TOLERANCE = 0.001
 """the least that a tolerance can be [deg]; none follows from a joint that is never
 driven, or never moves"""

@@ -7,9 +7,13 @@ import pytest
 from small_fits import Watcher, steps_of
 
 from hydroid import load_settings
+from hydroid.arrays import rms
+from hydroid.fitting.baselines import fit_baselines
+from hydroid.fitting.first_answer import first_answer
 from hydroid.fitting.fit import fit
 from hydroid.fitting.multistart import alone, by_numbers, lone_joints
 from hydroid.problem.problem import Problem
+from hydroid.progress import NOTE
 
 TRUTH = {
     "open_2": 0.35,
@@ -132,6 +136,28 @@ def test_joint_by_joint_then_together_finds_the_truth(problem, truth):
     assert result.refinement.ending.converged
 
 
+def test_the_first_answer_is_of_each_joint_alone_beside_simple_models(
+    problem, truth, caplog
+):
+    caplog.set_level(NOTE, "hydroid")
+    with pytest.raises(KeyboardInterrupt):
+        fit(problem, Watcher(stop_at=1))
+    said = [r.getMessage() for r in caplog.records if r.levelno == NOTE]
+    assert [line.split()[0] for line in said] == ["shoulder", "elbow"]
+    own = alone(problem, 3, truth)
+    limits = [*problem.settings.arm.ranges.values()][2]
+    models = fit_baselines(own.logs, 3, limits)
+    line = first_answer(own, 3, truth, models)
+    errors = own.output_errors(truth[None])
+    assert f"elbow alone errs by {np.degrees(own.rms(errors)[0]):.3g} deg" in line
+    for name, model in models.items():
+        assert f"{name} {np.degrees(rms(model.errors(own.logs))):.3g} deg" in line
+    assert line.endswith("better than each of them")
+    # valves that hardly open
+    lower = own.parameters.lower
+    assert first_answer(own, 3, lower, models).endswith("worse than nine numbers")
+
+
 def test_a_single_joint_is_fitted_with_the_others_as_the_settings_say(problem):
     assert (
         lone_joints(
@@ -164,7 +190,10 @@ def test_a_start_takes_a_valve_that_no_load_slows_from_nine_numbers():
     values = {f"{name}_{j}": value for name, value in true.items() for j in (2, 3)}
     problem = Problem(settings, [steps_of(settings, values, {2: levels, 3: levels})])
     lowest = problem.parameters.lower
-    start = problem.parameters.mapping(by_numbers(alone(problem, 2, lowest), 2, lowest))
+    own = alone(problem, 2, lowest)
+    ends = [*settings.arm.ranges.values()][1]
+    nine_numbers = fit_baselines(own.logs, 2, ends)["nine numbers"]
+    start = problem.parameters.mapping(by_numbers(own, 2, lowest, nine_numbers))
     for name, near in {
         "delay": 0.03,
         "dead_band": 5.0,

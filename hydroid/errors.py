@@ -5,7 +5,7 @@ The command line shows them as one line and ends with exit status 2. Any other e
 is a defect of hydroid and keeps its traceback.
 """
 
-LONGEST = 1500  # largest length of a message, in characters
+LONGEST = 1500  # characters of a message, at most
 
 
 class HydroidError(Exception):
@@ -49,7 +49,7 @@ def _shortened(text: str) -> str:
 
 
 class LogError(HydroidError):
-    """A CSV log that cannot be used as it is."""
+    """A log that cannot be used as it is."""
 
 
 class SettingsError(HydroidError):

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.findings import Finding
@@ -28,7 +29,8 @@ from hydroid.settings.search import MultistartSettings, RefinementSettings
 
 LEAST_LOAD = 1e-9
 """part of the arm's mass that is no load: a mass must be above 0"""
-FIRST_LOAD = 0.03  # part of the arm's mass from which a load is sought
+FIRST_LOAD = 0.03
+"""part of the arm's mass from which a load is sought"""
 
 
 def adapted(
@@ -121,29 +123,33 @@ def steps(
     problem = Problem(adapted(model, pool, logs), logs)
     taken = list[str]()
     last = _as_it_is(problem, model)
-    path = list[Plain]()
-    name = ""
-    while True:
-        path.append({"parameter": name, "left_out_deg": last.by_joint})
-        trials = dict[str, LeftOut]()
-        rises = dict[str, float]()
+    path: list[Plain] = [{"parameter": "", "left_out_deg": last.by_joint}]
+    while pool:
         # parameters that are asked for are freed in their order
-        for trial in pool[:1] if free else pool:
-            progress(f"freeing {trial}", len(taken), len(taken) + len(pool))
-            freed = problem.varied(adapted(model, [*taken, trial], logs))
-            begin = last.theta.copy()
-            if trial == TIP_LOAD:
-                begin[-1] = first_guess(model)
-            trials[trial] = refit(freed, begin)
-            rises[trial], _ = gain(trials[trial], last)
-        name = max(rises, key=rises.__getitem__, default="")
-        if not name:
-            return path
-        if not free and not is_better(trials[name], last, len(trials)):
-            return path
-        taken.append(name)
-        last = trials[name]
-        pool.remove(name)
+        tried = pool[:1] if free else pool
+        trials = dict[str, LeftOut]()
+        for name in tried:
+            progress(f"freeing {name}", len(taken), len(taken) + len(pool))
+            freed = problem.varied(adapted(model, [*taken, name], logs))
+            trials[name] = refit(freed, _begun(model, last, name))
+        rises = {name: gain(trial, last)[0] for name, trial in trials.items()}
+        best = max(rises, key=rises.__getitem__)
+        if not free and not is_better(trials[best], last, len(trials)):
+            break
+        last = trials[best]
+        path.append({"parameter": best, "left_out_deg": last.by_joint})
+        taken.append(best)
+        pool.remove(best)
+    return path
+
+
+def _begun(model: IdentifiedModel, last: LeftOut, name: str) -> Array:
+    """Return where a fit with another free parameter begins, shape (P,): where the last
+    one ended, and a load at the tip at a first guess."""
+    begun = last.theta.copy()
+    if name == TIP_LOAD:
+        begun[-1] = first_guess(model)
+    return begun
 
 
 def _candidates(settings: FitSettings, logs: Sequence[Log]) -> list[str]:

@@ -42,11 +42,14 @@ TINY = np.finfo(float).tiny
 
 @record
 class _Motion:
-    """What logs show in short windows: speeds [rad/s] and angles [rad] of all joints,
-    shape (n, J).
+    """What logs show in n short windows.
 
-    joints: those that a log drives and all measure, 0-based. commands: means of each
-    log's, shape (m, J) [%], over windows that begin `period` [s] after each other.
+    Attributes:
+        joints: those that a log drives and all measure, 0-based.
+        period: from the beginning of a window to that of the next one [s].
+        speed: of all joints [rad/s], shape (n, J).
+        angle: of all joints [rad], shape (n, J).
+        commands: of each log, the means over its m windows [%], shape (m, J).
     """
 
     joints: list[int]

@@ -188,14 +188,17 @@ class ExperimentSimulator:
         if first is None:
             return self._too_near(angle)
         limits = self._settings.design
-        name = self._settings.arm.joint_names[first.joint]
+        joint = self._settings.arm.joints[first.joint]
+        shown = joint.shown
         outside, fast = beyond(angle, self._settings)
         if first.fast:
             share = float(fast[:, first.joint].mean())
-            what = f"{name} faster than {limits.speed_deg_s:g} deg/s"
+            speed = f"{shown.of_degrees(limits.speed_deg_s):.4g} {shown.unit}/s"
+            what = f"{joint.name} faster than {speed}"
             return Broken(what, "design.speed_deg_s", share)
         share = float(outside[:, first.joint].mean())
-        what = f"{name} nearer than {limits.margin_deg:g} deg to an end of its range"
+        margin = f"{shown.of_degrees(limits.margin_deg):.4g} {shown.unit}"
+        what = f"{joint.name} nearer than {margin} to an end of its range"
         return Broken(what, "design.margin_deg", share)
 
     def _too_near(self, angle: Array) -> Broken:

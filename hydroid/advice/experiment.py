@@ -101,7 +101,8 @@ class RandomExperiments:
         lower, upper = np.array([joint.limits for joint in arm.joints]).T
         inward = np.minimum(np.radians(limits.margin_deg), 0.5 * (upper - lower))
         self._lower = lower + inward
-        self._upper = upper - inward
+        # where the margins meet, rounding must not put the upper one below
+        self._upper = np.maximum(upper - inward, self._lower)
         self._samples = experiment_samples(settings)
         self._rest = round(limits.rest_s / period)
         self._shortest, self._longest = (
@@ -125,6 +126,8 @@ class RandomExperiments:
         return experiment
 
     def _changed_once(self, experiment: Experiment) -> Experiment:
+        """Return an experiment with another pose, another input of a joint, levels a
+        little off, or levels drawn anew."""
         kind = self._rng.random()
         joint = self._rng.choice(self._joints)
         if kind < 0.1:
@@ -144,6 +147,7 @@ class RandomExperiments:
         return experiment.with_level(joint, place, far)
 
     def _input(self) -> Input:
+        """Draw levels and for how long each is held, after the rest."""
         starts = [self._rest]
         while True:
             lasts = self._rng.integers(self._shortest, self._longest + 1)
@@ -158,6 +162,8 @@ class RandomExperiments:
         return np.round(levels, 1)
 
     def _pose(self) -> Array:
+        """Draw a start pose: a named one, or, where any is allowed, mostly one between
+        the ends of the ranges."""
         if self._any_pose and (not len(self._poses) or self._rng.random() < 0.75):
             return self._rng.uniform(self._lower, self._upper)
         return self._poses[self._rng.integers(len(self._poses))]

@@ -24,11 +24,13 @@ def in_joint_units(content: Mapping[str, Any], arm: Arm) -> Plain:
     return _mapping(content, sliding)
 
 
-def _any(value: Any, sliding: Collection[str], *, in_row: bool) -> Any:
+def _changed(value: Any, sliding: Collection[str], *, in_row: bool) -> Any:
+    """Return a value with what it holds in other units; `in_row`: it belongs to a joint
+    that slides."""
     if isinstance(value, Mapping):
         return _mapping(value, sliding, in_row=in_row)
     if isinstance(value, list | tuple):
-        return [_any(one, sliding, in_row=in_row) for one in value]
+        return [_changed(entry, sliding, in_row=in_row) for entry in value]
     return value
 
 
@@ -40,16 +42,29 @@ def _mapping(
     changed: Plain = {}
     for key, value in values.items():
         if not key.endswith((DEGREES, SQUARED)):
-            changed[key] = _any(value, sliding, in_row=is_sliding)
+            changed[key] = _changed(value, sliding, in_row=is_sliding)
         elif is_sliding:
             changed |= _in_mm(key, value)
         elif isinstance(value, Mapping):
-            own = {name: one for name, one in value.items() if name in sliding}
-            changed[key] = {name: one for name, one in value.items() if name not in own}
-            if own:
-                changed |= _in_mm(key, own)
+            changed |= _by_joint(key, value, sliding)
         else:
             changed[key] = value
+    return changed
+
+
+def _by_joint(key: str, values: Mapping[str, Any], sliding: Collection[str]) -> Plain:
+    """Return numbers by the joints' names under the key, those of joints that slide
+    under that of mm."""
+    turning: Plain = {}
+    of_slides: Plain = {}
+    for name, value in values.items():
+        if name in sliding:
+            of_slides[name] = value
+        else:
+            turning[name] = value
+    changed: Plain = {key: turning}
+    if of_slides:
+        changed |= _in_mm(key, of_slides)
     return changed
 
 
@@ -63,8 +78,9 @@ def _in_mm(key: str, value: Any) -> Plain:
 
 
 def _times(factor: float, value: Any) -> Any:
+    """Return numbers, in whatever holds them, times a factor; None stays None."""
     if isinstance(value, Mapping):
-        return {name: _times(factor, one) for name, one in value.items()}
+        return {name: _times(factor, part) for name, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_times(factor, one) for one in value]
+        return [_times(factor, part) for part in value]
     return None if value is None else factor * value

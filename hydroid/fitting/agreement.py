@@ -38,6 +38,7 @@ PERIOD = 0.02
 STRIDE = 0.2
 """over which moves are compared with those of the model [s]"""
 TINY = 1e-12
+"""keeps divisors above 0"""
 LEAST_EASE = 0.2
 """part of its mean speed that a joint has at any angle, at least"""
 LEAST_LOGS = 3
@@ -45,15 +46,18 @@ LEAST_LOGS = 3
 LEAST_WAY = 5.0
 """that a joint must move in a log to be compared [deg]"""
 LEAST_WINDOWS = 4
+"""of a log at least: from their scatter come the standard deviations"""
 FAR = 4.0
 """standard deviations that a log is away from the rest, to stand out"""
 LEAST = np.array([0.08, 3.0, 0.04])
 """differences of speed [1], dead band [%] and delay [s] that matter"""
 SAME = np.array([1.0, 0.0, 0.0])
+"""the three numbers of a log that is as the others"""
 LEAST_NUMBERS = np.array([0.1, -40.0, -0.8])
 MOST_NUMBERS = np.array([10.0, 60.0, 0.8])
+"""bounds of the three numbers"""
 STEPS = np.array([0.2, 5.0, 0.1])
-"""bounds and scales of the three numbers"""
+"""scales of the three numbers"""
 
 
 @record
@@ -96,6 +100,8 @@ def compare_logs(
 
 
 def _moves(log: Log, joint: int) -> bool:
+    """Return whether a log drives a joint, and this moves far enough to be
+    compared."""
     way = np.rad2deg(np.ptp(log.angle_of(joint)))
     # NaN, which is not larger than anything: not measured
     return log.drives(joint) and bool(way > LEAST_WAY)
@@ -153,6 +159,8 @@ class _Course:
 
 
 def _compare(logs: Sequence[Log], joint: int, limits: Limits) -> Agreement | None:
+    """Compare a joint's motion in logs, each against the others; None where too few of
+    them show enough of it."""
     courses = [_course(log, joint, limits) for log in logs]
     courses = [course for course in courses if len(course.count) >= LEAST_WINDOWS]
     if len(courses) < LEAST_LOGS:
@@ -164,19 +172,19 @@ def _compare(logs: Sequence[Log], joint: int, limits: Limits) -> Agreement | Non
     courses = _stretched(courses, model)
     common = _refit(model, courses)
     rests, costs = _without_each(common, courses)
-    own = _numbers(rests, courses)
+    against_rest = _numbers(rests, courses)
     sources = tuple(course.log.source for course in courses)
     # the log without which the others fit best; it spoils the rest of each of the
     # others
-    seeming = int(np.argmin(costs + own.costs.min(axis=1)))
+    seeming = int(np.argmin(costs + against_rest.costs.min(axis=1)))
     clean = _numbers([rests[seeming]] * len(courses), courses)
     odd = _odd(clean, seeming, len(courses[seeming].count))
     if odd is not None:
         sd = np.sqrt(clean.variances)
         sd[seeming] = _deviations(clean, seeming)
         return Agreement(joint, sources, clean.values, sd, (seeming, odd))
-    deviations = [_deviations(own, k) for k in range(len(courses))]
-    return Agreement(joint, sources, own.values, np.array(deviations), None)
+    deviations = [_deviations(against_rest, k) for k in range(len(courses))]
+    return Agreement(joint, sources, against_rest.values, np.array(deviations), None)
 
 
 def _without_each(

@@ -21,13 +21,19 @@ from hydroid.search.pareto import average, non_dominated, segment_best, utopia
 class Fit:
     """The estimates of a fit, and what is known of the one to use.
 
-    problem: with the settings of the estimate to use, which `final` names. estimates:
-    by name, that of the search first. front: the non-dominated candidates, (n, P), and
-    their objectives, (n, S + 1). history: (G, len(HISTORY)). refinements: by the
-    estimate that each gave. ends: costs at which the starts of a multi-start ended, by
-    the joint that was fitted alone (0: all together). uncertainty, quantities: of the
-    final estimate. seconds: wall-clock time of "search", "refinement" and "uncertainty"
-    [s]; of a resumed fit, since it was resumed.
+    Attributes:
+        problem: with the settings of the estimate to use.
+        estimates: by name, that of the search first.
+        final: name of the estimate to use.
+        front: the non-dominated candidates, (n, P), and their objectives, (n, S + 1).
+        history: of the search, shape (G, len(HISTORY)).
+        refinements: by the estimate that each gave.
+        ends: costs at which the starts of a multi-start ended, by the joint that was
+            fitted alone (0: all together).
+        uncertainty: of the final estimate.
+        quantities: of the final estimate.
+        seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a
+            resumed fit, since it was resumed.
     """
 
     problem: Problem
@@ -78,7 +84,8 @@ def fit(
     # an empty one is still to be written to
     if checkpoints is None:
         checkpoints = {}
-    times, settings = [time.perf_counter()], problem.settings
+    times = [time.perf_counter()]
+    settings = problem.settings
     first = problem.varied(settings.of_estimate("best"))
     searched = search(first, watch, checkpoints)
     estimates = simulated(first, _candidates(first, searched))
@@ -108,9 +115,10 @@ def fit(
 
 
 def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
-    """The estimates that a search gives, by name, the one that the settings ask for
-    first."""
-    theta, memo = searched.theta, searched.memo
+    """Return the estimates that a search gives, by name, the one that the settings ask
+    for first."""
+    theta = searched.theta
+    memo = searched.memo
     if searched.single:
         return {"best": theta[segment_best(searched.population.objectives)[0]]}
     segments = memo.evaluate(theta)[:, :-1]
@@ -124,7 +132,7 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
 
 
 def _front(searched: Searched) -> tuple[Array, Array]:
-    """The different non-dominated candidates of the last population."""
+    """Return the different non-dominated candidates of the last population."""
     theta = searched.theta[
         np.sort(np.unique(searched.theta, axis=0, return_index=True)[1])
     ]

@@ -50,11 +50,16 @@ FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 class Estimate:
     """One parameter set with its response.
 
-    theta: shape (P,). segments: objectives by segment, shape (S,). overall: norm over
-    the whole record. rms: of the output error [rad]. responses: simulated outputs
-    [rad], (T, K) a log. gained: of an estimate with another term or model, by how much
-    it foretells parts of the logs left out better than the one below, and the standard
-    error of that (`left_out.gain`).
+    Attributes:
+        name: of the estimate.
+        theta: its parameters, shape (P,).
+        segments: objectives by segment, shape (S,).
+        overall: norm over the whole record.
+        rms: of the output error [rad].
+        responses: simulated outputs of each log [rad], shape (T, K).
+        gained: of an estimate with another term or model, by how much it foretells
+            parts of the logs left out better than the one below, and the standard error
+            of that (`left_out.gain`).
     """
 
     name: str
@@ -272,8 +277,12 @@ class Ladder:
         """Refine with the settings of an estimate, from the one kept; keep the result
         where it is better.
 
-        if_better: else it is kept in any case. begun: where it begins, shape (P,), if
-        not at the kept one.
+        Args:
+            whole: the problem of the whole fit.
+            step: the model and its terms.
+            settings: of least squares.
+            if_better: whether it is kept only then.
+            begun: where it begins, shape (P,), if not at the kept one.
         """
         last = self.problem
         start = self.kept
@@ -425,8 +434,8 @@ class Ladder:
     def _promises(
         self, problem: Problem, last: Problem, theta: Array, joint: int
     ) -> bool:
-        """Whether another term may gain anything for a joint alone, from the theta of
-        the last problem, (P,).
+        """Return whether another term may gain anything for a joint alone, from the
+        theta of the last problem, (P,).
 
         That takes one Jacobian, and most joints of most machines lack no term.
         """
@@ -521,12 +530,12 @@ class Ladder:
             self._keep(own, self._measured(own, result, step), step)
 
     def _is_at_end(self) -> bool:
-        """Whether there is no time left, or nothing but noise to explain."""
+        """Return whether there is no time left, or nothing but noise to explain."""
         return self._late or self.problem.leaves_noise(self.kept.theta)
 
     def _is_white(self) -> bool:
-        """Whether the errors of the estimate that is kept leave innovations that are
-        white."""
+        """Return whether the errors of the estimate that is kept leave innovations that
+        are white."""
         numbers = self.refinements[self.kept.name].numbers
         shown = likelihood_at(self.problem, self.kept.theta, numbers).shown
         errors = self.problem.output_errors(self.kept.theta[None])
@@ -619,8 +628,8 @@ def _likelier(problem: Problem, theta: Array, other: Array) -> Array:
 
 
 def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
-    """The joints, from 1, that begin alone: all that is new in the model is of single
-    joints, and of these.
+    """Return the joints, from 1, that begin alone: all that is new in the model is of
+    single joints, and of these.
 
     None where joints share a pump: what those that follow their logs take from it is
     not known well enough.
@@ -636,8 +645,8 @@ def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
 
 
 def _new_curves(problem: Problem, last: Problem) -> list[int]:
-    """The joints, from 1, whose valves have a curve here and had none in the last
-    model.
+    """Return the joints, from 1, whose valves have a curve here and had none in the
+    last model.
 
     None of a model whose joints have inertia: without that and the oil, the speeds are
     no better start.

@@ -68,17 +68,20 @@ class LeftOut:
     def by_joint(self) -> dict[str, float | None]:
         """Rms error of each compared joint by name [deg]."""
         settings = self.problem.settings
-        names, rms = settings.arm.joint_names, self.problem.rms
-        return {
-            names[j - 1]: finite(np.degrees(rms(self.errors[None], [j])[0]))
-            for j in settings.outputs
-        }
+        errors = dict[str, float | None]()
+        for joint in settings.outputs:
+            (rms,) = self.problem.rms(self.errors[None], [joint])
+            errors[settings.arm.name_of(joint)] = finite(np.degrees(rms))
+        return errors
 
 
 def not_fitted(problem: Problem, theta: Array, errors: Array) -> LeftOut:
     """Return the parts of logs as a model predicts them that was fitted to none.
 
-    theta: the model's, shape (P,). errors: its weighted output errors [rad], (R,).
+    Args:
+        problem: of the logs.
+        theta: of the model, shape (P,).
+        errors: its weighted output errors [rad], shape (R,).
     """
     nothing = np.zeros(int(blocks(problem).max()) + 1)
     return LeftOut(problem, theta, theta[None], errors, errors, nothing)
@@ -191,7 +194,7 @@ def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
 
 
 def is_better(after: LeftOut, before: LeftOut, among: int = 1) -> bool:
-    """Whether one model foretells the parts better than another by more than the
+    """Return whether one model foretells the parts better than another by more than the
     uncertainty of that.
 
     So does one that can be simulated where the other cannot. `among` is the number of
@@ -201,8 +204,8 @@ def is_better(after: LeftOut, before: LeftOut, among: int = 1) -> bool:
 
 
 def is_clear(rise: float, error: float, among: int = 1) -> bool:
-    """Whether a gain and its standard error, as `gain` returns them, say that a model
-    is better, one `among` several."""
+    """Return whether a gain and its standard error, as `gain` returns them, say that a
+    model is better, one `among` several."""
     # C. E. Bonferroni, 1936
     certain = float(normal.isf(LEVEL / among))
     return rise > max(certain * error, LEAST_GAIN) or rise == np.inf

@@ -90,7 +90,7 @@ class Multistart:
         return chromosomes
 
     def ask(self, population: Population | None, rng: Generator) -> Genes:
-        """The point that the next start reaches, shape (1, P)."""
+        """Return the point that the next start reaches, shape (1, P)."""
         number = 0 if population is None else len(population.chromosomes)
         theta = self.start(number)
         if lone_joints(self._problem):
@@ -109,7 +109,7 @@ class Multistart:
         return theta[None]
 
     def tell(self, population: Population | None, offspring: Population) -> Population:
-        """The points reached so far, with their negative log-likelihoods."""
+        """Return the points reached so far, with their negative log-likelihoods."""
         reached = Population(offspring.chromosomes, np.array([[self._cost]]))
         return reached if population is None else population.join(reached)
 
@@ -186,7 +186,8 @@ class Multistart:
         )
 
     def _parts(self, problem: Problem) -> list[Problem]:
-        """The problem's first seconds, more and more of them, and at last all of it.
+        """Return the problem's first seconds, more and more of them, and at last all of
+        it.
 
         A part in which nothing moves yet, as at the start from a stop, would only lead
         a start astray.
@@ -268,7 +269,8 @@ def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
 
 
 def has_curve(problem: Problem, joint: int) -> bool:
-    """Whether a joint's valve has a curve that is estimated, besides its power law."""
+    """Return whether a joint's valve has a curve that is estimated, besides its power
+    law."""
     parameters = problem.settings.parameters
     own = (parameters[name].quantity for name in problem.settings.acting_on(joint))
     return any(quantity.startswith(CURVE) for quantity in own)

@@ -215,10 +215,11 @@ def _at(likelihood: Likelihood, now: Refinement) -> Likelihood:
 
 
 def _rows(likelihood: Likelihood, now: Refinement) -> Callable[[Array], Array]:
-    """What least squares minimises: points of the unit box, (n, p), to innovations and
-    scores."""
-    parameters, rows = likelihood.problem.parameters, _at(likelihood, now).rows
-    return lambda unit: rows(parameters.from_unit(unit))
+    """Return what least squares minimises: points of the unit box, (n, p), to
+    innovations and scores."""
+    from_unit = likelihood.problem.parameters.from_unit
+    rows = _at(likelihood, now).rows
+    return lambda unit: rows(from_unit(unit))
 
 
 def _rms_error(likelihood: Likelihood, now: Refinement) -> float:

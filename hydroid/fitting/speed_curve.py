@@ -186,7 +186,8 @@ def _pairs(log: Log, joint: int, reach: Limits, delay: float) -> Array:
 
 
 def inside(angle: Array, reach: Limits) -> Mask:
-    """Which samples are not near the ends of a joint's travel in all logs, (T,)."""
+    """Return which samples are not near the ends of a joint's travel in all logs,
+    (T,)."""
     low, high = reach
     margin = END * (high - low)
     return (angle > low + margin) & (angle < high - margin)

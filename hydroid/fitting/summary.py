@@ -173,8 +173,8 @@ def angle_errors(known: Uncertainty) -> dict[str, AngleError]:
 
 
 def _deviation_ahead(errors: ErrorModel, i: int, seconds: float) -> float:
-    """Standard deviation of a signal so many seconds ahead, at its mean speed in the
-    logs [rad]."""
+    """Return the standard deviation of a signal so many seconds ahead, at its mean
+    speed in the logs [rad]."""
     sensor, rate, way, lasting_square, _ = errors.numbers[i]
     path = 0.0
     duration = 0.0
@@ -281,7 +281,7 @@ def _lasting_findings(
 def _parameter_findings(
     problem: Problem, estimate: Mapping[str, ParameterEstimate]
 ) -> list[Finding]:
-    """What is to be said about what the logs determine; a bound of 0 cannot be
+    """Return what is to be said about what the logs determine; a bound of 0 cannot be
     widened."""
     kinds = defaultdict[tuple[str, str], list[str]](list)
     for parameter in problem.parameters.parameters:

@@ -216,6 +216,8 @@ class _Following:
         every = np.concatenate(angles)
         reach = (float(every.min()), float(every.max()))
         self._used = [inside(angle, reach) for angle in angles]
+        # to find where a log rests takes as long as to follow it
+        self._starts = [float(log.start[column]) for log in self._logs]
         self._noise = 1.0
 
     def fitted(self, delay: float) -> JointStart:
@@ -251,11 +253,11 @@ class _Following:
         )
 
     def _of_sides(self, x: Array) -> tuple[Array, Array]:
-        """The numbers of both sides."""
+        """Return the numbers of both sides."""
         return x[: len(SCALE)], x[len(SCALE) : -2]
 
     def _noise_at(self, x: Array) -> float:
-        """Standard deviation of an error that counts by itself [rad]."""
+        """Return the standard deviation of an error that counts by itself [rad]."""
         # errors within MEMORY are about one
         alike = max(MEMORY / self._logs[0].period, 1.0)
         square = alike * np.mean(self._errors(x) ** 2)
@@ -268,16 +270,16 @@ class _Following:
         return np.concatenate(rows)
 
     def _errors(self, x: Array) -> Array:
-        """What has changed of the errors within MEMORY [rad], but near the ends of the
-        travel, shape (T,)."""
+        """Return what has changed of the errors within MEMORY [rad], but near the ends
+        of the travel, shape (T,)."""
         errors = list[Array]()
-        for log, used in zip(self._logs, self._used, strict=True):
+        every = zip(self._logs, self._used, self._starts, strict=True)
+        for log, used, start in every:
             command = log.command[:, self._column]
             is_back = command < 0
             # in samples
             delay = x[-2] / log.period
             lag = np.full(2, x[-1] / log.period)
-            start = float(log.start[self._column])
             way = self._speeds(x, command, is_back) * log.period
             angle = follow(way, is_back.astype(int), delay, lag, start, FREE)
             error = log.angle[:, self._column] - angle
@@ -348,7 +350,7 @@ def _relative_speed(command: Array, x: Array) -> Array:
 
 
 def _unusual(x: Array, dead: float) -> Array:
-    """How far numbers of a side are from usual ones, in standard deviations."""
+    """Return how far numbers of a side are from usual ones, in standard deviations."""
     # the last part of a curve has the factor 1, whose logarithm is 0
     bends = np.diff([*x[2:-1], 0.0]) / UNLIKE
     others = [

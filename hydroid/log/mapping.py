@@ -23,6 +23,9 @@ SHOWN = {"command": "%", "angle": "deg", "length": "mm", "pressure": "bar"}
 """units in which messages state what is measured"""
 ALIKE = 0.75
 """least likeness of two names of which one may be the other misspelt, from 0 to 1"""
+COMPARED = 10_000
+"""columns of a file up to which misspelt names are looked for: no machine logs more,
+and of a damaged file that takes long"""
 
 Ranges = Mapping[str, Limits]
 """of all joints [rad, m], by their names"""
@@ -162,6 +165,8 @@ def _misspelt(names: Collection[str], unused: Mapping[str, str]) -> dict[str, st
     The unused names of the file are those by their lower case.
     """
     misspelt = dict[str, str]()
+    if len(unused) > COMPARED:
+        return misspelt
     for name in names:
         for alike in get_close_matches(name.lower(), unused, 1, ALIKE):
             misspelt[name] = unused[alike]

@@ -88,7 +88,7 @@ class JointMotion:
         return path, against / path
 
     def contradicts(self, *, backward: bool) -> bool:
-        """Whether it clearly moves against the direction that the arm gives to a
+        """Return whether it clearly moves against the direction that the arm gives to a
         positive command.
 
         That is to negative angles of a joint that is `backward`, and else to positive

@@ -11,10 +11,16 @@ from hydroid.arrays import Array
 class Column(NamedTuple):
     """One quantity of a joint, or one point of one of its curves.
 
-    name: plain ASCII. label: the same in words. positive: it cannot be negative, and
-    its interval is multiplicative. at: where the point of a curve is, `along` what; the
-    points of a curve share their name. step, moves: as `CurveEstimate` has them. reach:
-    as `QuantityEstimate` has it.
+    Attributes:
+        name: in plain ASCII; the points of a curve share it.
+        label: the same in words.
+        unit: of the value.
+        positive: whether it cannot be negative, so that its interval is multiplicative.
+        at: where the point of a curve is; None: it is no curve's.
+        along: what `at` is.
+        step: as `CurveEstimate` has it.
+        moves: as `CurveEstimate` has it.
+        reach: as `QuantityEstimate` has it.
     """
 
     name: str

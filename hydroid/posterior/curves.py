@@ -44,8 +44,8 @@ StepCurves = Callable[[Array], Measured]
 
 
 def opening_curve(bench: Bench, candidates: Candidates, sign: float) -> Measured:
-    """The opening of the pump edge against commands of a sign that are held [mm²],
-    without leakage.
+    """Return the opening of the pump edge against commands of a sign that are held
+    [mm²], without leakage.
 
     Commands that are on or off in the logs tell of no others.
     """

@@ -75,7 +75,7 @@ class Posterior:
         return np.sqrt(np.diag(self.covariance))
 
     def parts(self, slopes: Array) -> Array:
-        """What each of p independent directions does to quantities, (p, m), from
+        """Return what each of p independent directions does to quantities, (p, m), from
         derivatives, (p, m).
 
         The sum of their squares is the variance.
@@ -83,8 +83,8 @@ class Posterior:
         return solve_triangular(self.root.T, slopes, lower=True)
 
     def sd(self, slopes: Array) -> Array:
-        """Standard deviations of quantities, shape (m,), from derivatives per relative
-        change, (p, m)."""
+        """Return the standard deviations of quantities, shape (m,), from derivatives
+        per relative change, (p, m)."""
         return np.linalg.norm(self.parts(slopes), axis=0)
 
     def add(self, rows: Array) -> "Posterior":

@@ -39,12 +39,12 @@ Measure = Callable[[Candidates], Measured]
 Quantities = tuple[dict[str, QuantityEstimate], dict[str, CurveEstimate]]
 """what follows from an estimate: single quantities, and curves, by name"""
 
-# of the curve of speed [%]
 COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
-# the same of stage 1, whose directions are alike
+"""of the curve of speed in each direction [%]"""
 GAIN_COMMANDS = (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0)
-# how long the step is held in which dead time and time constant are sought [s]
+"""the same of stage 1, whose directions are alike"""
 LASTS = 3.0
+"""how long the step is held in which dead time and time constant are sought [s]"""
 
 
 class Figure(NamedTuple):
@@ -152,8 +152,10 @@ def _curve(
 
 
 def _rounded(value: float | None) -> float:
-    """Six digits: nobody calculates with the points of a curve, and a file holds
-    hundreds."""
+    """Return a number with six digits.
+
+    Nobody calculates with the points of a curve, and a file holds hundreds.
+    """
     return float(f"{value:.6g}")
 
 
@@ -360,6 +362,7 @@ class DirectionTest:
         """Return the flow into the chamber at full command, from the speed there."""
         c, _, arm = actuator(self.bench, candidates)
         side = c.a if self.direction.sign > 0 else c.b
+        # from m³/s to L/min
         flow = 6e4 * side.area * np.abs(arm) * speed / self.bench.unit[0]
         label = f"100 % command, {self._place}"
         yield Figure(100.0, "full_flow", label, "L/min", flow, what="flow")

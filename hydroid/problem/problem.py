@@ -181,8 +181,8 @@ class Problem:
         return np.concatenate(errors, axis=1)
 
     def leaves_noise(self, theta: Array) -> bool:
-        """Whether errors at an estimate, (P,), change between samples as white noise
-        does."""
+        """Return whether errors at an estimate, (P,), change between samples as white
+        noise does."""
         errors = self.output_errors(theta[None])[0]
         for channel in self.channels:
             error = errors[channel.rows]

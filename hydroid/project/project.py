@@ -267,8 +267,7 @@ def _write_settings(stage: Path, arm: Arm, text: str) -> None:
     values, _ = read_yaml(stage / FIT)
     validate(values | {"arm": arm}, FitSettings, FIT)
     caption = f"{arm.name}, all joints at or near 0: does it look and turn like yours?"
-    picture, *_ = arm_picture(arm, caption)
-    write_atomic(stage / PICTURE, picture)
+    write_atomic(stage / PICTURE, arm_picture(arm, caption))
 
 
 def _finished(

@@ -65,12 +65,18 @@ def style() -> Generator[None]:
 def saved(drawing: Figure, title: str = "") -> tuple[bytes, bytes]:
     """Return a figure as PNG of 150 dpi and as SVG that needs no font; within
     `style`."""
+    png = _png(drawing, title)
+    svg = io.BytesIO()
+    drawing.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
+    return png, svg.getvalue()
+
+
+def _png(drawing: Figure, title: str) -> bytes:
+    """Return a figure as PNG of 150 dpi; within `style`."""
     drawing.suptitle(title, x=0.02, ha="left", fontsize=11, fontweight="bold")
     png = io.BytesIO()
-    svg = io.BytesIO()
     drawing.savefig(png, format="png", dpi=150, metadata={"Software": None})
-    drawing.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
-    return png.getvalue(), svg.getvalue()
+    return png.getvalue()
 
 
 def figure(chart: Chart) -> Figure:
@@ -174,12 +180,9 @@ ACROSS = 0.7
 of rotation is named"""
 
 
-def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
+def arm_picture(arm: Arm, title: str) -> bytes:
     """Draw an arm with all joints at 0, or at the ends of their ranges that are
-    nearest.
-
-    PNG and SVG.
-    """
+    nearest, as PNG."""
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
     angles = np.clip(0.0, arm.lower, arm.upper)
@@ -202,7 +205,7 @@ def arm_picture(arm: Arm, title: str) -> tuple[bytes, bytes]:
         if cylinders:
             _draw_cylinders(every_axes[1, 0], every_axes[1, 1], arm, cylinders)
         legend(drawing)
-        return saved(drawing, title)
+        return _png(drawing, title)
 
 
 def _draw_cylinders(

@@ -75,7 +75,7 @@ def sight(azimuth: float, elevation: float) -> Array:
 
 
 def _lines(model: mujoco.MjModel) -> list[Shape]:
-    """A line from each body to each that it carries.
+    """Return a line from each body to each that it carries.
 
     That of the last leads to its centre of mass.
     """

@@ -135,7 +135,7 @@ def _policy(*scripts: str) -> str:
 
 @cache
 def _script() -> str:
-    """The page's own script."""
+    """Return the page's own script."""
     folder = files("hydroid").joinpath("reporting")
     names = ("moving_arm.js", "charts.js")
     return "\n".join(folder.joinpath(name).read_text("utf-8") for name in names)

@@ -84,8 +84,8 @@ class Joint:
         )
 
     def has(self, quantity: str) -> bool:
-        """Whether a quantity of a joint's actuator means anything of what moves this
-        one."""
+        """Return whether a quantity of a joint's actuator means anything of what moves
+        this one."""
         kind = CHOICES[quantity].of
         if kind == "cylinder":
             return isinstance(self.actuator, LinearActuator)

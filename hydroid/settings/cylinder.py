@@ -136,8 +136,8 @@ def _keeps_sign(values: Array) -> bool:
 def _pinned(
     given: Pivots | None, data: Any, joint: str
 ) -> tuple[Triangle, tuple[Vector, Vector]]:
-    """The triangle of a cylinder's pivots, and these in the frames of parent and moved
-    body [m]."""
+    """Return the triangle of a cylinder's pivots, and these in the frames of parent and
+    moved body [m]."""
     ends = _pivot_ends(given, data, joint)
     child = data.model.joint(joint).bodyid[0]
     parent = data.model.body_parentid[child]

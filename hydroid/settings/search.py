@@ -139,10 +139,11 @@ class DesignSettings(Settings):
     """shortest and longest time between two changes of a command [s];
     the shortest limits the bandwidth"""
     speed_deg_s: Positive = 30.0
-    """largest joint speed in the simulated experiment [deg/s]"""
+    """largest joint speed in the simulated experiment [deg/s]; a joint that slides by
+    1 m counts as one that turns by 1 rad"""
     margin_deg: NotNegative = 5.0
     """smallest distance of the simulated motion from the ends of the joints' ranges
-    [deg]"""
+    [deg]; of a joint that slides as for `speed_deg_s`"""
     clearance_m: Positive | None = 0.05
     """smallest distance of the simulated arm from itself and from the floor; where the
     arm's file has a pair, also from the carrier and the other arm, at rest in

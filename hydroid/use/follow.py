@@ -226,8 +226,8 @@ def _within_range(plant: Plant, path: Log) -> tuple[Log, list[Missed]]:
 
 
 def _named(limit: Limit | None, away: float) -> bool:
-    """Whether a reason is named where a joint misses its wish by a part of its largest
-    one."""
+    """Return whether a reason is named where a joint misses its wish by a part of its
+    largest one."""
     if limit is None:
         return False
     return away > (AWAY_SLOW if limit in (Limit.SLOWEST, Limit.LEAKS) else AWAY)

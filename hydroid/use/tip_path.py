@@ -137,7 +137,7 @@ class TipKinematics:
 
 
 def holds_tip(table: Table) -> bool:
-    """Whether a file holds positions of the tip, in `COLUMNS` or `FROM_START`.
+    """Return whether a file holds positions of the tip, in `COLUMNS` or `FROM_START`.
 
     Raises LogError: it holds some of these columns only, or has them without a unit.
     """

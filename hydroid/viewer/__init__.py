@@ -24,8 +24,8 @@ def choose_platform() -> None:
 
 
 def renders(platform: str) -> bool:
-    """Whether MuJoCo can draw with a platform here: its library may be there without a
-    driver.
+    """Return whether MuJoCo can draw with a platform here: its library may be there
+    without a driver.
 
     It is tried in a process of its own, since a process can load only one.
     """

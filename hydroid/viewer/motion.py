@@ -70,7 +70,7 @@ def _rms_error(logs: Mapping[str, Log], simulated: Mapping[str, Array]) -> float
 
 
 def _moves(angle: Array) -> Mask:
-    """Which measured angles, shape (T, J), move, (J,)."""
+    """Return which measured angles, shape (T, J), move, (J,)."""
     return np.nan_to_num(np.ptp(angle, axis=0)) > 0
 
 

@@ -9,14 +9,17 @@ from made_logs import step_log
 from recovery import assert_recovered, recover
 
 import hydroid
+from hydroid.advice.design import design
 from hydroid.arm.locked import lock
 from hydroid.arm.model import load_model
+from hydroid.errors import SettingsError
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import judge
 from hydroid.log import Log
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.quantities import joint_measure
 from hydroid.problem.bindings import Bindings
+from hydroid.progress import no_progress
 from hydroid.reporting.predictions import validation_page
 from hydroid.settings.fit import FitSettings
 
@@ -94,6 +97,19 @@ def test_a_reader_meets_millimetres_and_newtons(settings: FitSettings) -> None:
     ).tables["errors"]
     row = dict(zip(errors.header, errors.rows[0], strict=True))
     assert (row["rms"], row["unit"]) == (pytest.approx(20), "mm")
+
+
+def test_what_no_experiment_of_it_keeps_is_said_in_millimetres(
+    settings: FitSettings,
+) -> None:
+    """A joint that slides by 1 m counts as one that turns by 1 rad."""
+    limits = {"margin_deg": 60, "poses": "any", "effort": 2, "duration_s": 4}
+    limits |= {"clearance_m": None}
+    tight = settings.changed({"design": settings.design.changed(limits)})
+    values = {**TRUTH, "D": 2000.0}
+    theta = tight.parameter_set().vector(values, "the truth")
+    with pytest.raises(SettingsError, match=r"telescope nearer than 1047 mm to an end"):
+        design(tight, theta, [], 1, no_progress)
 
 
 def test_areas_delay_and_mass_are_recovered(settings: FitSettings) -> None:

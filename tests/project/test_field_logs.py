@@ -22,6 +22,8 @@ from hydroid.errors import LogError
 from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
 
+pytestmark = pytest.mark.usefixtures("no_picture")
+
 
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Arm:

@@ -30,6 +30,7 @@ URDF = Path(__file__).parents[2] / "examples" / "urdf"
 EXAMPLE = runpy.run_path(str(URDF / "make_example.py"))
 """how it simulates a machine like a project's, its boom's valve wired the other way
 round"""
+pytestmark = pytest.mark.usefixtures("no_picture")
 
 
 def init(

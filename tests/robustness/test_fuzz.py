@@ -150,9 +150,9 @@ def test_damaged_runs_are_refused_in_one_line(
     ],
 )
 def test_hostile_logs_are_refused_at_once(tmp_path: Path, data: bytes) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     assert not KINDS["log"].read(tmp_path, data)
-    assert time.perf_counter() - started < 10
+    assert time.process_time() - started < 10
 
 
 BEGINNINGS = {
@@ -189,17 +189,17 @@ NAMES = {
 def test_a_name_without_end_is_refused_at_once(
     kind: str, name: bytes, tmp_path: Path
 ) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     assert not KINDS[kind].read(tmp_path, logs()[0].replace(b"u2_pct", name))
-    assert time.perf_counter() - started < 10
+    assert time.process_time() - started < 10
 
 
 @pytest.mark.parametrize("part", ["outputs=[1] ", "outputs=[\0] ", "[" * 30])
 def test_a_setting_without_end_is_refused_at_once(part: str, tmp_path: Path) -> None:
     data = (part * (20_000_000 // len(part))).encode()
-    started = time.perf_counter()
+    started = time.process_time()
     assert not KINDS["set"].read(tmp_path, data)
-    assert time.perf_counter() - started < 2
+    assert time.process_time() - started < 2
 
 
 @pytest.mark.parametrize(

@@ -8,33 +8,49 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 from log_files import head
 from taken import without_times
+from warm import Command, warm_process
 
 SHORT = ["--quiet", "--set", "search.ga.population=10", "--algorithm", "ga"]
 STAGE_1 = "{K: 0.2, D: 80, S: 0, M1: 4.6, M2: 5.1, M3: 22.5, M4: 1.6, M5: 4, M6: 4.7}"
 """what stage 2 takes of stage 1"""
+Process = subprocess.Popen[str] | Command
 OWN = {".lock", "run.log", "checkpoint.previous.npz"}
 """files of a run that tell of its course"""
 
 
+@pytest.fixture(scope="module")
+def warm() -> Generator[str]:
+    """The address of a process that begins commands at once."""
+    with warm_process() as address:
+        yield address
+
+
 def start(
-    cwd: Path, *options: object, out: str, command: str = "fit-mech"
-) -> "subprocess.Popen[str]":
-    """Begin or resume a run of six seconds of a virtual rig's log; checkpoints after
-    every generation."""
+    cwd: Path,
+    *options: object,
+    out: str,
+    command: str = "fit-mech",
+    warm: str | None = None,
+) -> "Process":
+    """Begin or resume a run of six seconds of a virtual rig's log, by a warm process or
+    as a new Python; checkpoints after every generation."""
     if not (cwd / "log.csv").exists():
         head(cwd / "log.csv", 600)
         (cwd / "mech.yaml").write_text(STAGE_1)
+    words = [command, "log.csv", *map(str, options), "--out", out, "--resume"]
+    always = "import hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; "
+    if warm is not None:
+        return Command(warm, words, cwd, before=always)
     # what the tests ignore (SIGHUP under nohup, SIGINT in the background) the run would too
     code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "
     code += "signal.signal(signal.SIGINT, signal.default_int_handler); "
-    code += "import hydroid.commands.app as a, hydroid.fitting.checkpoints as s; s.SAVE_EVERY = 0; "
-    code += "print('imported', flush=True); a.main()"
-    words = [command, "log.csv", *map(str, options), "--out", out, "--resume"]
+    code += always + "import hydroid.commands.app as a; a.main()"
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],
         cwd=cwd,
@@ -44,13 +60,13 @@ def start(
     )
 
 
-def finish(process: "subprocess.Popen[str]", code: int = 0) -> str:
+def finish(process: "Process", code: int = 0) -> str:
     out, errors = process.communicate(timeout=300)
     assert process.returncode == code, out + errors
     return errors
 
 
-def wait_for(process: "subprocess.Popen[str]", run: Path, pattern: str) -> None:
+def wait_for(process: "Process", run: Path, pattern: str) -> None:
     while not any(run.rglob(pattern)) and process.poll() is None:
         time.sleep(1e-3)
 
@@ -110,17 +126,23 @@ STOPPED = 130
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SEARCHES)
-def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
+def test_killed_runs_end_the_same(tmp_path: Path, kind: str, warm: str):
     """Every run is ended at moments drawn at random, twice, and resumed; KILLS in the
-    environment asks for more. Each signal ends runs of three kinds."""
+    environment asks for more. Each signal ends runs of three kinds.
+
+    The whole one is a new Python, so that the hashes of its names are others.
+    """
     rng = random.Random(kind)
     command = "fit-hyd" if kind == "ladder" else "fit-mech"
     # the report's commands name the run's folder
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     whole.mkdir()
     killed.mkdir()
-    hits, began = 0, time.monotonic()
-    finish(start(whole, *SEARCHES[kind], out="run", command=command))
+    hits = 0
+    process = start(whole, *SEARCHES[kind], out="run", command=command)
+    wait_for(process, whole, "run.json")
+    began = time.monotonic()
+    finish(process)
     took = time.monotonic() - began
     first = 2 * [*SEARCHES].index(kind)
     wanted = int(os.environ.get("KILLS", "2"))
@@ -129,10 +151,8 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
         if hits == wanted:
             break
         end = ENDS[(first + hits) % len(ENDS)]
-        process = start(killed, *SEARCHES[kind], out="run", command=command)
-        # what a signal does before, test_files tells of the command itself
-        assert process.stdout is not None
-        process.stdout.readline()
+        # what a signal does while Python begins, test_files tells of the command itself
+        process = start(killed, *SEARCHES[kind], out="run", command=command, warm=warm)
         if rng.random() < 0.5:
             time.sleep(took * rng.random())
         else:  # while a file is written
@@ -147,24 +167,24 @@ def test_killed_runs_end_the_same(tmp_path: Path, kind: str):
             assert content(killed / "run") == content(whole / "run")
             shutil.rmtree(killed / "run")
             continue
-        # without a handler while Python begins
+        # without a handler before the command has one
         assert process.returncode in (STOPPED, -end), errors
         assert "Traceback" not in errors
         hits += 1
     assert hits == wanted
-    finish(start(killed, *SEARCHES[kind], out="run", command=command))
+    finish(start(killed, *SEARCHES[kind], out="run", command=command, warm=warm))
     assert content(killed / "run") == content(whole / "run")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("notice", ["SIGUSR1", "SIGHUP"])
 def test_a_notice_ends_a_run_with_its_checkpoint_and_a_second_run_is_refused(
-    tmp_path: Path, notice: str
+    tmp_path: Path, notice: str, warm: str
 ):
     options = [*SHORT, "--set", "search.ga.generations=4000"]
-    process = start(tmp_path, *options, out="run")
+    process = start(tmp_path, *options, out="run", warm=warm)
     wait_for(process, tmp_path / "run", "checkpoint.npz")
-    errors = finish(start(tmp_path, *options, out="run"), 2)
+    errors = finish(start(tmp_path, *options, out="run", warm=warm), 2)
     assert f"run: is in use by process {process.pid} on " in errors
     assert len(errors.splitlines()) == 1
     for _ in range(3):  # clusters repeat themselves

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import warm
 import yaml
 from log_files import halve
 
@@ -130,8 +131,15 @@ def test_what_the_pages_show_runs(tmp_path: Path):
       fit-*) set -- "$@" --set refinement.iterations=5 --set search.multistart.starts=1 \
         --set simulation.model=quasi-static;;
       design) set -- "$@" --set design.effort=20;;
-    esac; "{sys.executable}" -m hydroid "$@"; }}
+    esac; "{sys.executable}" -S "{warm.__file__}" "$WARM" "$@"; }}
 """
+    with warm.warm_process() as address:
+        environment["WARM"] = address
+        run_pages(tmp_path, hydroid, environment)
+
+
+def run_pages(folder: Path, hydroid: str, environment: dict[str, str]) -> None:
+    """Run what the pages show in a folder, with a shell's function `hydroid`."""
     for name in RUN:
         page = blocks(ROOT / "docs" / f"{name}.md")
         shell = [
@@ -142,7 +150,7 @@ def test_what_the_pages_show_runs(tmp_path: Path):
         code = "".join(b.text for b in page if b.language == "python")
         for where, command in (*shell, (name, [sys.executable, "-c", code])):
             done = subprocess.run(
-                command, cwd=tmp_path, env=environment, capture_output=True, text=True
+                command, cwd=folder, env=environment, capture_output=True, text=True
             )
             assert done.returncode == 0, f"{where}\n{done.stderr[-2000:]}"
 

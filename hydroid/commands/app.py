@@ -159,8 +159,8 @@ def _no_type(ctx: Any) -> str:
 
 ABOUT = "Estimate the physical parameters of a hydraulic arm from logs of commands and joint angles."
 WHERE_TO_START = (
-    "Where to start: with the shipped arm, hydroid check and hydroid fit-mech; with your own arm, "
-    "hydroid init. 'The article' is Montazeri et al. 2017, whose method hydroid follows."
+    "Where to start: hydroid init for your own arm; hydroid check and hydroid fit-mech for the arm "
+    "that comes with hydroid.  'The article' is Montazeri et al. 2017, whose method hydroid follows."
 )
 
 app = typer.Typer(

@@ -47,10 +47,11 @@ def export(
 ) -> Result[list[str]]:
     """Write a fitted machine for other programs.
 
-    parameters: random sets of all parameters (draws) with which the model agrees with
-    the logs, ranges of the parameters, and errors of the model. table: steady speed of
+    parameters: draws (random sets of all parameters that agree with the logs about as well
+    as the fit), the range of each parameter, and errors of the model. table: steady speed of
     each joint against its command, as CSV for a PLC. urdf: your own file with the
-    masses of the fit. mjcf: a model that plain MuJoCo steps. linear: A, B, C, D and
+    masses of the fit. mjcf: a model that MuJoCo simulates without
+    hydroid. linear: A, B, C, D and
     delays near one pose and command, as JSON, and a page with step response and Bode
     plot. fmu: FMI 2 for co-simulation.
 
@@ -68,7 +69,7 @@ def export(
         pose (NAME): The pose where the plant starts, by its name in the arm's file
             [default: the start pose of the settings].
         at (JOINT=PCT,...): With --to linear: the commands [%] near which the model
-            holds, such as boom=30,arm=-40. Joints without a command stand still.
+            holds, such as boom=30,arm=-40. Joints that are not named stand still.
 
     Raises:
         SettingsError: another kind, an option that is missing, or a fit of stage 1,

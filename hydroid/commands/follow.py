@@ -47,8 +47,8 @@ def follow(
     """Find the commands that move the joints along given angles, or the tip along a
     given path.
 
-    The commands are a feed-forward: play them without feedback. They allow for dead
-    band, valve curve, load, pump, delay and lags. Where a joint cannot be as fast as
+    The commands are a feed-forward: play them without feedback. They take dead band, valve
+    curve, load, pump, delay and lags into account. Where a joint cannot be as fast as
     asked, hydroid says so and takes the nearest speed. It also predicts the error with
     a band, and writes a page with the arm in motion.
 
@@ -61,15 +61,16 @@ def follow(
         trajectory (TRAJECTORY.csv): Joint angles over time, in the columns and units of
             the fit's logs. Or the tip's position over time: columns time_s, x_m, y_m and
             z_m, or dx_m, dy_m and dz_m from where the tip starts. The tip is the
-            `payload` site of the arm's file; without one, the end of the last link.
-            Joints without a column, or without commands, stand still: at the first
-            angles of the fit's first log, or in the pose of --set start_pose=NAME.
+            point (site) `payload` of the arm's file; without it, the end of the last
+            link. Joints without a column, and joints that take no commands, stand
+            still: at the first angles of the fit's first log, or in the pose of --set
+            start_pose=NAME.
         out (LOG.csv): The commands and the angles asked for, in the columns and units
             of the fit's logs; the page has the same name [default:
             runs/follow/commands.csv; in Python nothing is written].
         payload (0 or more): Mass at the tip [kg].
-        repair: Fill gaps in the joint angles of the trajectory up to log.repair_s
-            (0.1 s). The file stays as it is.
+        repair: Fill gaps in the joint angles of the trajectory that are not longer than the
+            setting log.repair_s (0.1 s). The file is not changed.
 
     Raises:
         LogError: the trajectory cannot be used, or moves a joint that takes no

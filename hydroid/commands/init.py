@@ -29,9 +29,9 @@ def init(
 ) -> "Result[Project]":
     """Write a project for your arm and your log: all files that a fit needs.
 
-    The project holds the arm's file and model, the settings of a fit, a picture to
-    check the arm by, and the commands to run next. Start values and priors come from
-    the arm's size.
+    The project holds the arm's file and model, the settings of a fit, a picture in which
+    you can check the arm, and the commands to run next. Start values of the parameters, and
+    priors (their likely values and standard deviations), come from the arm's size.
 
     If it does not recognise the columns of a log, it lists them in the project's
     fit.yaml, and the exit status is 2. Write there what each column is. Then run init
@@ -48,16 +48,16 @@ def init(
         arm (robot.urdf): URDF or MJCF of the arm, or an arm's YAML file [default: a
             template of boxes].
         log (LOG): A log; its columns are guessed. Repeat the option for several logs.
-            The last of several is kept: the commands that init prints
-            fit the others, and validate on this one.
+            The commands that init prints fit all of them but the
+            last, and then test the fit on the last.
         config (YAML): The fit.yaml of an earlier init, whose `log` section you have
             completed. Its columns and its arm stay; all other settings are written
             anew.
-        joints (NAME,NAME): The joints that u1, u2, ... of the log drive, by name or
-            number from 1 [default: the order in the arm's file].
-        lengths (M,M): Lengths [m] of the links that these joints move. They take the
-            place of --arm: hydroid makes an arm of boxes. Example: --joints
-            swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9. A joint that slews has 0.
+        joints (NAME,NAME): The joints of the commands u1, u2, ... in the log, in this order, by
+            name or number from 1 [default: the order in the arm's file].
+        lengths (M,M): Lengths [m] of the links that these joints move, if you have no file
+            for --arm: hydroid makes an arm of boxes. Example: --joints
+            swing,boom,arm,bucket --lengths 0,3.7,1.6,0.9. The length is 0 for a joint that slews.
         total_mass (KG): Mass of all moving links together [kg]. The masses of the arm's
             file are scaled to it.
         force: Replace the files of an earlier project in the folder.

@@ -40,18 +40,19 @@ SettingChanges = Mapping[str, Any] | Sequence[str] | None
 SHARED = f"""
     logs (LOG): Logs of commands and joint angles. Formats: {FORMATS}.
     log (LOG): A log. Formats: {FORMATS}.
-    fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a plant saved in Python,
-        or a YAML file of parameter values.
+    fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a folder that Plant.save wrote
+        in Python, or a YAML file of parameter values.
     out (DIR): Folder for the tables [default: runs/COMMAND; in Python nothing is
         written].
     config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine.
-        For the shipped arm: the name of a shipped config.
+        Or the name of a file that comes with hydroid, for its arm:
+        fit-mech or fit-hyd.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
-    repair: Fill gaps in the logs up to log.repair_s (0.1 s), and list what was filled. The log
-        files stay as they are.
+    repair: Fill gaps in the logs that are not longer than the setting log.repair_s (0.1 s),
+        and list what was filled. The log files are not changed.
     seed (0 or more): Seed of the random numbers. The same seed gives exactly the same result.
-    dask (local[:N]|ADDRESS): Simulate in N processes of this machine, or on the workers of the Dask
-        scheduler at ADDRESS. The result is the same.
+    dask (local[:N]|ADDRESS): Simulate in N processes on this computer, or on a cluster: the
+        workers of the Dask scheduler (dask.org) at ADDRESS. The result is the same.
     arm (right|left|both): For a machine of two arms: which of them move. Columns such
         as right_u2_pct and left_q2_deg belong to one arm. All other columns apply to
         every arm that moves.
@@ -59,14 +60,15 @@ SHARED = f"""
         log].
 
     algorithm (NAME): Search: ga or nsga2 (genetic algorithms), multistart (least squares from
-        several starts), or pymoo (the algorithm of that package that search.pymoo.algorithm names).
+        several starts), or pymoo (an algorithm of the package pymoo: the setting
+        search.pymoo.algorithm names it).
     start (RUN|YAML): Start the search from the values of a fit.
     resume: Continue the stopped run in --out; start it if there is none.
     refinement: After the search, refine its estimate by least squares.
     budget (TIME): Time for search and refinement, such as 90s, 5min or 2h. When it is
         up, hydroid keeps the best model so far. Intervals and report take some more
-        time. To go on, repeat the command with --resume. The time is that of the clock,
-        and counts anew when a run is resumed.
+        time. To go on, repeat the command with --resume; it then has the
+        same time again. The time is that on the clock, not processor time.
     threads (N): Number of threads (0: one per core, or with --dask one per worker).
 """
 

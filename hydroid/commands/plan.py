@@ -58,8 +58,8 @@ def suggest(
     """Find what the model lacks, and what to do next.
 
     First it tests every parameter that the fit keeps fixed or switched off, such as a
-    delay or dry friction. It also tests those with one value for both directions of a
-    joint, or for several joints. It frees the most promising ones, and judges them
+    delay or dry friction. Where both directions of a joint, or several joints, share a
+    value, it also tests separate values. It frees the most promising ones, and judges them
     by the error on parts of the logs that are left out. Then it tests whether an
     angle of the logs has the wrong sign. Last it lists actions, from weighing a link to a
     new experiment, and how much each would reduce the uncertainty.

@@ -109,8 +109,8 @@ def fit_hyd(
 ) -> FitResult:
     """Estimate the hydraulic actuators (stage 2).
 
-    By default it estimates piston areas, valve openings, onsets (the voltages at the
-    smallest commands), delay, damping and friction. The config can free more, such as
+    By default it estimates piston areas, valve openings, onsets (the
+    voltages at the smallest commands), delay, damping and friction. The config can free more, such as
     the amplifier's currents and the solenoid. Writes a run folder as fit-mech does.
 
     Example: hydroid fit-hyd LOG.csv --config mine/fit.yaml --out runs/hyd
@@ -122,9 +122,8 @@ def fit_hyd(
         out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is
             written].
         mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values. The
-            masses are fixed at these values. Without it, the masses are those of the
-            arm's file, and a mass that is a parameter of the settings is estimated,
-            unless they fix it.
+            masses are fixed at these values. Without this option, the masses are those of the
+            arm's file; those that the settings have as free parameters are estimated.
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -352,7 +351,7 @@ def adapt(
     'payloads={LOADED.csv: 250}'. For a load that nobody has weighed, free tip_load.
     Without --free, hydroid tries parameters one by one. It leaves parts of the logs out
     of the fit and predicts them. A parameter stays free only if that lowers the error
-    there. The result is a run that every command takes.
+    there. The result is a run folder like that of a fit.
 
     Example: hydroid adapt SLOW.csv --fit runs/hyd --free P_flow
 
@@ -361,9 +360,9 @@ def adapt(
 
     Args:
         logs (LOG): The new logs.
-        free (NAME,NAME): Parameters to free [default: those that help, among masses,
-            pump, tip_load and the effects of groups of logs, such as those of a day
-            (log.groups)].
+        free (NAME,NAME): Parameters to free [default: those that help. hydroid tries
+            masses, pump, tip_load, and differences between groups of logs, such as
+            days, if log.groups names groups].
         out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.

@@ -65,8 +65,7 @@ def validate(
     Args:
         fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a plant saved in Python,
             or a YAML file of parameter values. Repeat the option to compare several.
-        tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. For
-            one of each joint: --set 'tolerance_deg={boom: 2, arm: 1}' [default: the
+        tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. To give each joint its own: --set 'tolerance_deg={boom: 2, arm: 1}' [default: the
             fit's, or else 2 % of a joint's travel].
         apart: These logs were recorded under other conditions, such as another load.
             The fit's report shows them, but its verdict does not count them. Repeat
@@ -279,10 +278,10 @@ def report(
         print(hydroid.report("runs/array/seed-*", merge=True).content["best"])
 
     Args:
-        runs (RUN): Folders of finished runs; with --merge also a quoted pattern.
+        runs (RUN): Folders of finished runs; with --merge also a pattern in quotes, such as
+            'runs/array/seed-*'.
         merge: The folders are runs of one fit with different seeds: show median and
-            spread of their estimates. Runs that are not finished or damaged are left
-            out, with a warning.
+            spread of their estimates. Unfinished and damaged runs are left out, with a warning.
         figures: Also write every chart as PNG and SVG, to figures/.
         out (DIR): Folder for the tables of --merge.
 

@@ -11,7 +11,7 @@ Compiled functions run over the T samples of a course. `gain`, `carry`, `scale` 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -233,17 +233,11 @@ def _scored(pairs: Pairs, logarithms: Array) -> _Scored:
     information = np.zeros((len(NUMBERS), len(NUMBERS)))
     numbers = np.exp(logarithms)
     for course, error in pairs:
-        cost += _score(
-            error,
-            course.used,
-            course.stops,
-            course.way,
-            course.period,
-            course.readings,
-            numbers,
-            gradient,
-            information,
-        )
+        times = (course.used, course.stops, course.way, course.period, course.readings)
+        of_one = _score(error, times, numbers)
+        cost += of_one[0]
+        gradient += of_one[1]
+        information += of_one[2]
     return _Scored(logarithms, cost, gradient, information)
 
 
@@ -372,23 +366,16 @@ def _adjoint(
 
 
 @njit(cache=True)
-def _score(
-    error: Array,
-    used: Mask,
-    stops: Mask,
-    way: Array,
-    period: float,
-    readings: float,
-    numbers: Array,
-    gradient: Array,
-    information: Array,
-) -> float:
-    """Negative log-likelihood of an error, (T,), but for a constant.
+def _score(error: Array, times: Any, numbers: Array) -> tuple[float, Array, Array]:
+    """Negative log-likelihood of an error, (T,), but for a constant; its gradient by the
+    logarithms of NUMBERS, (5,); the expected information on these, (5, 5).
 
-    Its gradient by the logarithms of NUMBERS is added to `gradient`, (5,), and the
-    expected information to `information`, (5, 5). It is `_gains` and `_innovations` in
-    one pass, with their derivatives: `of_` is by each logarithm.
+    `times` are used, stops, way, period and readings of a course. It is `_gains` and
+    `_innovations` in one pass, with their derivatives: `of_` is by each logarithm.
     """
+    used, stops, way, period, readings = times
+    gradient = np.zeros(len(numbers))
+    information = np.zeros((len(numbers), len(numbers)))
     count = len(numbers)
     sensor, rate, per_way, lasting_level, time = numbers
     kept = np.exp(-period / time)
@@ -482,7 +469,7 @@ def _score(
     for i in range(count):
         for j in range(i):
             information[j, i] = information[i, j]
-    return cost
+    return cost, gradient, information
 
 
 @njit(cache=True)

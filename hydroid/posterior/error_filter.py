@@ -38,6 +38,8 @@ LONGEST_STEP = 2.0
 """change of the logarithm of a number in one step at most"""
 ENOUGH = 1e-3
 """gain of the log-likelihood below which the search for the numbers ends"""
+SETTLED = 1.0
+"""gain of the log-likelihood below which one set of numbers is as good as another"""
 DAMPING = 1e-3
 """of the first step of the search for the numbers"""
 MOST_DAMPING = 1e6
@@ -158,7 +160,8 @@ def most_likely(
 
     `least` is the smallest variance of the sensor's noise; where it is `given`, it is
     that (NaN: it is not). The search is over logarithms. It begins at `start`; None: at
-    a guess that is mostly noise, and at one that is mostly drift.
+    a guess that is mostly noise, and at one that is mostly drift, which must end at
+    clearly likelier numbers: logs tell less where errors drift.
     """
     square = max(mean_square(pairs), least)
     bounds = np.log(_bounds(square, least, given))
@@ -168,7 +171,11 @@ def most_likely(
         # a number may be 0, which has no logarithm
         begin = np.log(np.maximum(numbers, 1e-300))
         ends.append(_by_scoring(pairs, np.clip(begin, *bounds.T), bounds))
-    return np.exp(min(ends, key=lambda end: end.cost).logarithms)
+    best = ends[0]
+    for other in ends[1:]:
+        if other.cost < best.cost - SETTLED:
+            best = other
+    return np.exp(best.logarithms)
 
 
 class _Scored(NamedTuple):

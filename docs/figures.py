@@ -168,7 +168,7 @@ def _rounded(value: float | None) -> float | None:
 def at_a_glance(figures: Figures) -> str:
     """Return the README's table."""
     lines = [
-        ["", "rig: shoulder", "excavator: boom", "arm", "bucket", "swing"],
+        ["", *(f"{machine}: {joint}" for machine, joint in JOINTS)],
         ["---"] * 6,
     ]
     joints = [figures[machine][joint] for machine, joint in JOINTS]

@@ -305,7 +305,7 @@ def _estimate_in(folder: Path) -> Path:
         return file
     if is_file(folder / DESCRIPTION):
         raise RunError("holds no estimate yet", folder, "resume the fit")
-    hint = "name a run folder, a folder of Plant.save or a YAML file"
+    hint = "give a run folder, a folder that Plant.save wrote, or a YAML file of values"
     raise RunError("holds no estimate", folder, hint)
 
 

@@ -209,7 +209,9 @@ def _lacks_columns(
     lacking = [signal for signal in wanted if signal.name not in table.names]
     if len(lacking) == len(wanted) and not misspelt and not table.holds_numbers:
         return LogError(
-            "holds no table of numbers", table.source, "name a log, such as a CSV file"
+            "holds no table of numbers",
+            table.source,
+            "give the path of a log, such as a CSV file",
         )
     # only two are named, and those say most
     lacking.sort(key=lambda signal: signal.name not in misspelt)

@@ -185,8 +185,10 @@ class Recording:
         if len(rows):
             row = self._place(rows[0])
         more = ""
-        if len(rows) > 1:
-            more = f" (and {len(rows) - 1} more, to {self._place(rows[-1])})"
+        others = len(rows) - 1
+        if others > 0:
+            word = "row" if others == 1 else "rows"
+            more = f" (and {others} more {word}, up to {self._place(rows[-1])})"
         column = ""
         about = subjects
         if signal is not None:

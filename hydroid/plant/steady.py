@@ -30,8 +30,8 @@ class Limit(StrEnum):
     STOP = "at its stop"
     FULL = "full command is not enough"
     PUMP = "the pump gives no more"
-    SLOWEST = "slower than its slowest speed"
-    LEAKS = "sags, as its valve leaks"
+    SLOWEST = "cannot move that slowly"
+    LEAKS = "sinks because its valve leaks"
 
 
 @record

@@ -89,7 +89,7 @@ def _missed(group: Sequence[Missed], lead: float, arm: Arm) -> str:
     had = two_digits(shown.factor * worst.had)
     wished = two_digits(shown.factor * worst.wished)
     what = f"{arm.joint_names[worst.joint]}: {worst.limit}"
-    speeds = f"at worst {had} {shown.unit}/s where {wished} are wished"
+    speeds = f"at worst {had} instead of {wished} {shown.unit}/s"
     return f"{what}, {speeds}; {listed(spans, 3)} s into the path"
 
 

@@ -239,7 +239,7 @@ def _unreached(
     missed = int(np.sum(off > UNREACHED))
     what = (
         f"the tip cannot reach {spelt(points[worst])} at {time[worst]:.4g} s: "
-        f"it stays {off[worst]:.3g} m off, the most of {missed} such samples"
+        f"it stays {off[worst]:.3g} m away, the worst of {missed} samples out of reach"
     )
     hint = f"only joints with commands move; the tip starts at {spelt(first)}"
     return LogError(what, source, hint)

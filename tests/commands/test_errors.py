@@ -70,7 +70,7 @@ WRONG = [
     (
         "fit-mech {root}/README.md",
         "log",
-        "holds no table of numbers; name a log",
+        "holds no table of numbers; give the path of a log",
     ),
     ("validate {log}", "usage", "--fit"),
     ("validate {log} --fit nowhere", "settings", "nowhere"),

@@ -76,7 +76,7 @@ FAULTS = {
     "every 6 s": (
         values(lambda t: t * [600, 1, 1, 1, 1]),
         "column time_s",
-        "every 6 s, at most 0.1 s can be used; take more samples, or check",
+        "every 6 s, but needs one every 0.1 s or more often; take more samples, or check",
     ),
     "ks": (values(lambda t: t * [0.001, 1, 1, 1, 1]), "column time_s", "log.time.unit"),
 }  # fmt: skip
@@ -204,7 +204,7 @@ def test_every_fault_of_a_file_is_reported_at_once(tmp_path: Path) -> None:
         if one.kind == "row left out"
     )
     assert str(left_out).endswith(
-        "line 13, column u2_pct: no value is there (and 3 more, to line 31): left out"
+        "line 13, column u2_pct: no value is there (and 3 more rows, up to line 31): left out"
     )
     with pytest.raises(LogError, match=r"log\.csv, line 11, column u1_pct: "):
         read(path)

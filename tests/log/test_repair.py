@@ -100,7 +100,7 @@ def test_a_hole_at_an_end_is_not_invented(tmp_path: Path) -> None:
     path = save(tmp_path / "log.csv", table)
     log, (finding,) = read(path, repair=True)
     assert (finding.level, place(finding)) == ("warning", "line 2, column u1_pct")
-    assert "no value is there (and 1 more, to line 81): left out" in finding.what
+    assert "no value is there (and 1 more row, up to line 81): left out" in finding.what
     assert len(log.time) == 78
 
 
@@ -133,7 +133,10 @@ def test_up_to_two_lost_samples_are_bridged_with_a_warning(
     whole, _ = read(save(tmp_path / "whole.csv", lines(values)))
     log, (lost,) = read(path)
     assert (lost.level, lost.kind) == ("warning", "lost")
-    assert lost.what == f"samples lost: {count + 1} (and 1 more, to line {302 - count})"
+    assert (
+        lost.what
+        == f"samples lost: {count + 1} (and 1 more row, up to line {302 - count})"
+    )
     assert place(lost) == "line 102, column time_s"
     there = np.delete(np.arange(400), [*range(100, 100 + count), 300])
     np.testing.assert_array_equal(log.angle[there], whole.angle[there])
@@ -226,7 +229,7 @@ def test_where_many_rows_hold_no_numbers_none_is_left_out(tmp_path: Path) -> Non
     for row in table[10:15]:
         row[3] = "off"
     (fault,) = faults(save(tmp_path / "log.csv", table))
-    assert "'off' is not a number (and 4 more, to line 15)" in fault.what
+    assert "'off' is not a number (and 4 more rows, up to line 15)" in fault.what
 
 
 def test_a_part_is_written_and_read_back_to_the_same_bits(tmp_path: Path) -> None:

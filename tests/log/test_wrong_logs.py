@@ -244,13 +244,15 @@ WRONG = (
         lambda: of("u2", np.negative),
     ),
     Wrong(
-        "the same at a joint that turns to negative angles",
+        "a command wired the other way, at a joint whose cylinder turns it to negative angles",
         "warning: at positive commands",
         lambda: of("u1", np.negative, dig()),
         config=EXCAVATED,
     ),
     Wrong(
-        "clocks that differ by 0.3 s", "warning: as no machine does", lambda: early(0.3)
+        "clocks that differ by 0.3 s",
+        "warning: which no machine can do",
+        lambda: early(0.3),
     ),
     Wrong(
         "commands that are all 0",
@@ -275,7 +277,7 @@ WRONG = (
     ),
     Wrong("a dropped sample", "warning: samples lost: 1", lambda: without(900)),
     Wrong(
-        "a sample that stands twice",
+        "a sample that is in the log twice",
         "warning: does not increase",
         lambda: of("", lambda v: v[ROWS]),
     ),
@@ -294,7 +296,11 @@ WRONG = (
     Wrong("a spike of 25 deg", "warning: jumps by 25", lambda: of("q2", spiked)),
     Wrong("half a second of zeros", "warning: jumps by", lambda: of("q2", dropped)),
     Wrong("a zero point that moves", "warning: jumps by", lambda: of("q2", shifted)),
-    Wrong("seconds cut out and renumbered", "warning: jumps by", renumbered),
+    Wrong(
+        "some seconds missing, and the time goes on without a gap",
+        "warning: jumps by",
+        renumbered,
+    ),
     Wrong(
         "a sensor with steps of 2 deg",
         "note: in steps of 2 deg",
@@ -311,7 +317,7 @@ WRONG = (
         lambda: of("q6", lambda q: (q + 280) % 360 - 180),
     ),
     Wrong(
-        "an encoder of 0 to 360 deg on a joint with a range",
+        "an encoder of 0 to 360 deg on a joint that cannot turn all the way round",
         "note: wraps by 360",
         lambda: of("q5", lambda q: q % 360),
     ),

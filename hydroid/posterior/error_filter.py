@@ -11,7 +11,7 @@ Compiled functions run over the T samples of a course. `gain`, `carry`, `scale` 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -38,6 +38,8 @@ LONGEST_STEP = 2.0
 """change of the logarithm of a number in one step at most"""
 ENOUGH = 1e-3
 """gain of the log-likelihood below which the search for the numbers ends"""
+SETTLED = 1.0
+"""gain of the log-likelihood below which one set of numbers is as good as another"""
 DAMPING = 1e-3
 """of the first step of the search for the numbers"""
 MOST_DAMPING = 1e6
@@ -158,7 +160,8 @@ def most_likely(
 
     `least` is the smallest variance of the sensor's noise; where it is `given`, it is
     that (NaN: it is not). The search is over logarithms. It begins at `start`; None: at
-    a guess that is mostly noise, and at one that is mostly drift.
+    a guess that is mostly noise, and at one that is mostly drift, which must end at
+    clearly likelier numbers: logs tell less where errors drift.
     """
     square = max(mean_square(pairs), least)
     bounds = np.log(_bounds(square, least, given))
@@ -168,7 +171,11 @@ def most_likely(
         # a number may be 0, which has no logarithm
         begin = np.log(np.maximum(numbers, 1e-300))
         ends.append(_by_scoring(pairs, np.clip(begin, *bounds.T), bounds))
-    return np.exp(min(ends, key=lambda end: end.cost).logarithms)
+    best = ends[0]
+    for other in ends[1:]:
+        if other.cost < best.cost - SETTLED:
+            best = other
+    return np.exp(best.logarithms)
 
 
 class _Scored(NamedTuple):
@@ -233,17 +240,11 @@ def _scored(pairs: Pairs, logarithms: Array) -> _Scored:
     information = np.zeros((len(NUMBERS), len(NUMBERS)))
     numbers = np.exp(logarithms)
     for course, error in pairs:
-        cost += _score(
-            error,
-            course.used,
-            course.stops,
-            course.way,
-            course.period,
-            course.readings,
-            numbers,
-            gradient,
-            information,
-        )
+        times = (course.used, course.stops, course.way, course.period, course.readings)
+        of_one = _score(error, times, numbers)
+        cost += of_one[0]
+        gradient += of_one[1]
+        information += of_one[2]
     return _Scored(logarithms, cost, gradient, information)
 
 
@@ -372,23 +373,16 @@ def _adjoint(
 
 
 @njit(cache=True)
-def _score(
-    error: Array,
-    used: Mask,
-    stops: Mask,
-    way: Array,
-    period: float,
-    readings: float,
-    numbers: Array,
-    gradient: Array,
-    information: Array,
-) -> float:
-    """Negative log-likelihood of an error, (T,), but for a constant.
+def _score(error: Array, times: Any, numbers: Array) -> tuple[float, Array, Array]:
+    """Negative log-likelihood of an error, (T,), but for a constant; its gradient by the
+    logarithms of NUMBERS, (5,); the expected information on these, (5, 5).
 
-    Its gradient by the logarithms of NUMBERS is added to `gradient`, (5,), and the
-    expected information to `information`, (5, 5). It is `_gains` and `_innovations` in
-    one pass, with their derivatives: `of_` is by each logarithm.
+    `times` are used, stops, way, period and readings of a course. It is `_gains` and
+    `_innovations` in one pass, with their derivatives: `of_` is by each logarithm.
     """
+    used, stops, way, period, readings = times
+    gradient = np.zeros(len(numbers))
+    information = np.zeros((len(numbers), len(numbers)))
     count = len(numbers)
     sensor, rate, per_way, lasting_level, time = numbers
     kept = np.exp(-period / time)
@@ -482,7 +476,7 @@ def _score(
     for i in range(count):
         for j in range(i):
             information[j, i] = information[i, j]
-    return cost
+    return cost, gradient, information
 
 
 @njit(cache=True)

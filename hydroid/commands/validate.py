@@ -65,7 +65,8 @@ def validate(
     Args:
         fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a plant saved in Python,
             or a YAML file of parameter values. Repeat the option to compare several.
-        tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. To give each joint its own: --set 'tolerance_deg={boom: 2, arm: 1}' [default: the
+        tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. To give each
+            joint its own: --set 'tolerance_deg={boom: 2, arm: 1}' [default: the
             fit's, or else 2 % of a joint's travel].
         apart: These logs were recorded under other conditions, such as another load.
             The fit's report shows them, but its verdict does not count them. Repeat

@@ -9,7 +9,6 @@ import numpy as np
 from hydroid.arrays import Array, Mask
 from hydroid.fitting.checkpoints import Checkpoints, saving
 from hydroid.fitting.step import Step
-from hydroid.posterior.error_filter import SETTLED
 from hydroid.posterior.error_model import Likelihood
 from hydroid.progress import LOGGER
 from hydroid.search.descent import (
@@ -23,6 +22,10 @@ from hydroid.search.descent import (
 )
 from hydroid.search.least_squares import UNDAMPED, step
 from hydroid.settings.search import RefinementSettings
+
+SETTLED = 1.0
+"""gain of the log-likelihood below which the numbers of the error model stay as they
+are: so they settle"""
 
 ROUGH = 1e-3
 """gain below which a least squares of output errors ends that is to lead near an

@@ -11,11 +11,11 @@ Compiled functions run over the T samples of a course. `gain`, `carry`, `scale` 
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.optimize import lsq_linear
+from scipy.optimize import OptimizeResult, minimize
 
 from hydroid.arrays import Array, Mask
 from hydroid.posterior.course import Course
@@ -32,18 +32,6 @@ FIRST_TIME = 0.3
 """time constant of a lasting error with which the search for the numbers begins [s]"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
-STEPS = 60
-"""steps of the search for the numbers at most"""
-LONGEST_STEP = 2.0
-"""change of the logarithm of a number in one step at most"""
-ENOUGH = 1e-3
-"""gain of the log-likelihood below which the search for the numbers ends"""
-SETTLED = 1.0
-"""gain of the log-likelihood below which one set of numbers is as good as another"""
-DAMPING = 1e-3
-"""of the first step of the search for the numbers"""
-MOST_DAMPING = 1e6
-"""of a step that is too short to gain anything"""
 
 
 def noise_and_drift(sensor: float, rate: float = 0.0) -> Array:
@@ -160,92 +148,29 @@ def most_likely(
 
     `least` is the smallest variance of the sensor's noise; where it is `given`, it is
     that (NaN: it is not). The search is over logarithms. It begins at `start`; None: at
-    a guess that is mostly noise, and at one that is mostly drift, which must end at
-    clearly likelier numbers: logs tell less where errors drift.
+    a guess that is mostly noise, and at one that is mostly drift.
     """
     square = max(mean_square(pairs), least)
     bounds = np.log(_bounds(square, least, given))
+
+    def cost(logarithms: Array) -> float:
+        values = np.exp(logarithms)
+        return sum(
+            _negative_log_likelihood(course, error, values) for course, error in pairs
+        )
+
     starts = _guesses(pairs, square) if start is None else (start,)
-    ends = list[_Scored]()
+    options = {"maxiter": 60, "ftol": 1e-6}  # of a log-likelihood in the thousands
+    ended = list[OptimizeResult]()
     for numbers in starts:
         # a number may be 0, which has no logarithm
-        begin = np.log(np.maximum(numbers, 1e-300))
-        ends.append(_by_scoring(pairs, np.clip(begin, *bounds.T), bounds))
-    best = ends[0]
-    for other in ends[1:]:
-        if other.cost < best.cost - SETTLED:
-            best = other
-    return np.exp(best.logarithms)
-
-
-class _Scored(NamedTuple):
-    """Logarithms of NUMBERS, shape (5,), with the negative log-likelihood there, its
-    gradient, (5,), and the expected information, (5, 5)."""
-
-    logarithms: Array
-    cost: float
-    gradient: Array
-    information: Array
-
-
-def _by_scoring(pairs: Pairs, begin: Array, bounds: Array) -> _Scored:
-    """Return the most likely numbers near `begin`, (5,), within bounds, (5, 2), all of
-    them logarithms.
-
-    Fisher's scoring: Newton's steps with the expected information in place of the
-    second derivatives (A. C. Harvey, *Forecasting, Structural Time Series Models and
-    the Kalman Filter*, 1989, section 3.4), damped as in Levenberg-Marquardt's method.
-    """
-    now = _scored(pairs, begin)
-    damping = DAMPING
-    for _ in range(STEPS):
-        step = _scoring_step(now, bounds, damping)
-        after = _scored(pairs, np.clip(now.logarithms + step, *bounds.T))
-        gain = now.cost - after.cost
-        if gain > 0.0:
-            now = after
-            damping = max(0.1 * damping, DAMPING)
-            if gain < ENOUGH:
-                break
-        else:
-            damping *= 10.0
-            if damping > MOST_DAMPING:
-                break
-    return now
-
-
-def _scoring_step(now: _Scored, bounds: Array, damping: float) -> Array:
-    """Return the damped step within the bounds, (5, 2), and within LONGEST_STEP."""
-    diagonal = np.diagonal(now.information)
-    # a number without effect would have no step that is best
-    least = np.finfo(float).eps * diagonal.max() + np.finfo(float).tiny
-    damped = now.information + np.diag(damping * diagonal + least)
-    # |L' s + L⁻¹ g|² is twice the quadratic model, but for a constant
-    factor = np.linalg.cholesky(damped)
-    target = -np.linalg.solve(factor, now.gradient)
-    lower = np.maximum(bounds[:, 0] - now.logarithms, -LONGEST_STEP)
-    upper = np.minimum(bounds[:, 1] - now.logarithms, LONGEST_STEP)
-    free = upper > lower
-    step = np.zeros(len(free))
-    limits = (lower[free], upper[free])
-    step[free] = lsq_linear(factor.T[:, free], target, limits, method="bvls").x
-    return step
-
-
-def _scored(pairs: Pairs, logarithms: Array) -> _Scored:
-    """Return the negative log-likelihood of the errors of all pairs, and how it
-    changes."""
-    cost = 0.0
-    gradient = np.zeros(len(NUMBERS))
-    information = np.zeros((len(NUMBERS), len(NUMBERS)))
-    numbers = np.exp(logarithms)
-    for course, error in pairs:
-        times = (course.used, course.stops, course.way, course.period, course.readings)
-        of_one = _score(error, times, numbers)
-        cost += of_one[0]
-        gradient += of_one[1]
-        information += of_one[2]
-    return _Scored(logarithms, cost, gradient, information)
+        begin = np.clip(np.log(np.maximum(numbers, 1e-300)), *bounds.T)
+        result = minimize(
+            cost, begin, method="L-BFGS-B", bounds=bounds, options=options
+        )
+        ended.append(result)
+    best = min(ended, key=lambda result: result.fun)
+    return np.exp(best.x)
 
 
 def _bounds(square: float, least: float, given: float) -> Array:
@@ -279,6 +204,13 @@ def mean_square(pairs: Pairs) -> float:
     """Return the mean square of one signal's errors, over the samples that count."""
     used = np.concatenate([error[course.used] for course, error in pairs])
     return float(np.mean(used**2))
+
+
+def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> float:
+    carry, step = _model(course, numbers)
+    sensor = float(numbers[0])
+    start = sensor / course.readings
+    return _cost(error, course.used, sensor, start, step, carry)
 
 
 @njit(cache=True)
@@ -373,110 +305,43 @@ def _adjoint(
 
 
 @njit(cache=True)
-def _score(error: Array, times: Any, numbers: Array) -> tuple[float, Array, Array]:
-    """Negative log-likelihood of an error, (T,), but for a constant; its gradient by the
-    logarithms of NUMBERS, (5,); the expected information on these, (5, 5).
+def _cost(
+    error: Array, used: Mask, sensor: float, start: float, step: Array, carry: Array
+) -> float:
+    """Negative log-likelihood of an error, (T,), but for a constant.
 
-    `times` are used, stops, way, period and readings of a course. It is `_gains` and
-    `_innovations` in one pass, with their derivatives: `of_` is by each logarithm.
+    `_gains` and `_innovations` in one pass, which a search for the numbers repeats some
+    hundred times.
     """
-    used, stops, way, period, readings = times
-    gradient = np.zeros(len(numbers))
-    information = np.zeros((len(numbers), len(numbers)))
-    count = len(numbers)
-    sensor, rate, per_way, lasting_level, time = numbers
-    kept = np.exp(-period / time)
-    of_kept = kept * period / time
-    lasting_step = lasting_level * (1.0 - kept**2)
-    drift_variance = sensor / readings
+    drift_variance = start
     lasting_variance = 0.0
     covariance = 0.0
     drift = 0.0
     lasting = 0.0
-    of_drift_variance = np.zeros(count)
-    of_lasting_variance = np.zeros(count)
-    of_covariance = np.zeros(count)
-    of_drift = np.zeros(count)
-    of_lasting = np.zeros(count)
-    of_total = np.zeros(count)
-    of_new = np.zeros(count)
-    of_drift_variance[0] = drift_variance
     cost = 0.0
     for k in range(len(error)):
         if used[k]:
-            with_drift = drift_variance + covariance
-            with_lasting = lasting_variance + covariance
-            total = with_drift + with_lasting + sensor
+            total = drift_variance + 2.0 * covariance + lasting_variance + sensor
             new = error[k] - drift - lasting
             cost += 0.5 * (new * new / total + np.log(total))
-            first = with_drift / total
-            second = with_lasting / total
-            shrinks = 0.5 * (1.0 - new * new / total) / total
-            for i in range(count):
-                of_with_drift = of_drift_variance[i] + of_covariance[i]
-                of_with_lasting = of_lasting_variance[i] + of_covariance[i]
-                by = of_with_drift + of_with_lasting
-                if i == 0:
-                    by += sensor
-                of_total[i] = by
-                changes = -of_drift[i] - of_lasting[i]
-                of_new[i] = changes
-                gradient[i] += new / total * changes + shrinks * by
-                of_first = (of_with_drift - first * by) / total
-                of_second = (of_with_lasting - second * by) / total
-                of_drift[i] += of_first * new + first * changes
-                of_lasting[i] += of_second * new + second * changes
-                of_drift_variance[i] -= first * (2.0 * of_with_drift - first * by)
-                of_lasting_variance[i] -= second * (2.0 * of_with_lasting - second * by)
-                of_covariance[i] -= (
-                    second * of_with_drift
-                    + first * of_with_lasting
-                    - first * second * by
-                )
-            half = 0.5 / total**2
-            for i in range(count):
-                for j in range(i + 1):
-                    information[i, j] += (
-                        of_new[i] * of_new[j] / total + half * of_total[i] * of_total[j]
-                    )
+            first = (drift_variance + covariance) / total
+            second = (lasting_variance + covariance) / total
             drift += first * new
             lasting += second * new
-            drift_variance -= first * with_drift
-            lasting_variance -= second * with_lasting
-            covariance -= first * with_lasting
-        if k + 1 < len(error) and stops[k + 1]:
-            # nothing outlasts a stop, and nothing is added there
+            drift_variance -= first * first * total
+            lasting_variance -= second * second * total
+            covariance -= first * second * total
+        if carry[0, k] > 0.0:
+            drift_variance += step[0, k]
+            lasting_variance = carry[1, k] ** 2 * lasting_variance + step[1, k]
+            covariance *= carry[1, k]
+        else:
             drift_variance = 0.0
             lasting_variance = 0.0
             covariance = 0.0
-            drift = 0.0
-            lasting = 0.0
-            of_drift_variance[:] = 0.0
-            of_lasting_variance[:] = 0.0
-            of_covariance[:] = 0.0
-            of_drift[:] = 0.0
-            of_lasting[:] = 0.0
-            continue
-        for i in range(count):
-            of_lasting_variance[i] *= kept**2
-            of_covariance[i] *= kept
-            of_lasting[i] *= kept
-        of_drift_variance[1] += rate * period
-        of_drift_variance[2] += per_way * way[k]
-        of_lasting_variance[3] += lasting_step
-        of_lasting_variance[4] += (
-            2.0 * kept * of_kept * (lasting_variance - lasting_level)
-        )
-        of_covariance[4] += of_kept * covariance
-        of_lasting[4] += of_kept * lasting
-        drift_variance += rate * period + per_way * way[k]
-        lasting_variance = kept**2 * lasting_variance + lasting_step
-        covariance *= kept
-        lasting *= kept
-    for i in range(count):
-        for j in range(i):
-            information[j, i] = information[i, j]
-    return cost, gradient, information
+        drift *= carry[0, k]
+        lasting *= carry[1, k]
+    return cost
 
 
 @njit(cache=True)

@@ -18,12 +18,11 @@ from made_errors import (
     stopping,
 )
 from made_logs import HYDRAULIC, TRUTH, noisy, simulate_log, stepped
-from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
 from hydroid import load_settings
 from hydroid.posterior.course import at_stops
-from hydroid.posterior.error_filter import SETTLED, SHORTEST, whitened
+from hydroid.posterior.error_filter import SHORTEST, whitened
 from hydroid.posterior.error_model import (
     LEAST_NOISE,
     MEMORY,
@@ -202,23 +201,6 @@ def test_the_numbers_are_the_most_likely_from_whatever_numbers_before(before, la
     assert cost(found) < cost(model_of_errors(logs, true))
     from_truth = model_of_errors(logs, true).estimated(row)
     assert cost(found) == pytest.approx(cost(from_truth), abs=0.5)
-
-
-@pytest.mark.parametrize("numbers", [DRIFTING, LASTING])
-def test_scipy_finds_no_numbers_that_are_likelier(numbers):
-    course = stopping(1500)
-    row = drawn(np.random.default_rng(11), course, numbers)[0]
-    found = model_of_errors([course], DRIFTING).estimated(row)
-
-    def cost(logarithms: np.ndarray) -> float:
-        return -model_of_errors([course], np.exp(logarithms)).log_likelihood(row)
-
-    begin = np.log(found.numbers[0])
-    elsewhere = begin + np.random.default_rng(12).normal(0.0, 0.5, begin.size)
-    for start in (begin, elsewhere):
-        other = minimize(cost, start, method="Nelder-Mead", options={"maxfev": 2000})
-        # scipy knows no bounds, and what is likelier by less is as good
-        assert cost(begin) < other.fun + SETTLED
 
 
 def test_white_noise_alone_is_weighed_by_its_mean_square_and_has_no_drift():

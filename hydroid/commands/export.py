@@ -50,8 +50,7 @@ def export(
     parameters: draws (random sets of all parameters that agree with the logs about as well
     as the fit), the range of each parameter, and errors of the model. table: steady speed of
     each joint against its command, as CSV for a PLC. urdf: your own file with the
-    masses of the fit. mjcf: a model that MuJoCo simulates without
-    hydroid. linear: A, B, C, D and
+    masses of the fit. mjcf: a model that MuJoCo simulates alone. linear: A, B, C, D and
     delays near one pose and command, as JSON, and a page with step response and Bode
     plot. fmu: FMI 2 for co-simulation.
 

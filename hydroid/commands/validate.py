@@ -279,8 +279,7 @@ def report(
         print(hydroid.report("runs/array/seed-*", merge=True).content["best"])
 
     Args:
-        runs (RUN): Folders of finished runs; with --merge also a pattern in quotes, such as
-            'runs/array/seed-*'.
+        runs (RUN): Folders of finished runs; with --merge also a pattern in quotes.
         merge: The folders are runs of one fit with different seeds: show median and
             spread of their estimates. Unfinished and damaged runs are left out, with a warning.
         figures: Also write every chart as PNG and SVG, to figures/.

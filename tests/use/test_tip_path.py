@@ -151,7 +151,7 @@ def without_number(place):
         (
             beyond,
             "time_s,x_m,y_m,z_m",
-            r"cannot reach x .* at 4 s: it stays 4\.\d+ m off",
+            r"cannot reach x .* at 4 s: it stays 4\.\d+ m away",
         ),
         (
             backwards,

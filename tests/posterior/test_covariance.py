@@ -188,8 +188,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(stage, phi):
         deviations.append(found.standard_deviation)
         estimates.append(theta)
     cover = np.mean(hits, axis=0)
-    # another processor's rounding moves a fit over an edge now and then
-    assert (cover >= 0.92).all(), cover
+    assert (cover > 0.92).all(), cover
     assert (cover < 0.985).all(), cover
     np.testing.assert_allclose(
         np.mean(deviations, axis=0), np.std(estimates, axis=0), rtol=0.1

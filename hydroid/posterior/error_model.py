@@ -47,6 +47,7 @@ from hydroid.posterior.course import Course, make_course
 from hydroid.posterior.error_filter import (
     Filter,
     Pairs,
+    fewest,
     make_filter,
     mean_square,
     most_likely,
@@ -162,6 +163,19 @@ class ErrorModel:
             )
         return replace(self, numbers=numbers)
 
+    def simplest(self, errors: Array) -> "ErrorModel":
+        """Return the error model without the numbers that weighted output errors, (R,),
+        hardly ask for (`error_filter.fewest`)."""
+        numbers = self.numbers.copy()
+        for i, signal in enumerate(self.signals):
+            numbers[i] = fewest(
+                self._pairs(i, errors),
+                _least(signal),
+                float(self.given[i]),
+                numbers[i],
+            )
+        return replace(self, numbers=numbers)
+
     def independent(self, errors: Array) -> "ErrorModel":
         """Return the error model whose noise makes weighted output errors, (R,), most
         likely, without a drift or what lasts."""
@@ -216,7 +230,9 @@ class ErrorModel:
         else:  # it is as good as a drift
             growth += 2.0 * lasting / time
         # within which the filter of these errors follows the drift [s]
-        follows = np.sqrt(noise / max(growth, np.finfo(float).tiny))
+        follows = np.inf
+        if growth > 0.0:
+            follows = np.sqrt(noise / growth)
         return noise_and_drift(1.0, between / max(follows, memory) ** 2)
 
     def _level(self, unit: "ErrorModel", i: int) -> float:

@@ -21,18 +21,21 @@ there, and stays free.
 """
 
 import math
+from dataclasses import replace
 from enum import StrEnum
 from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.stats import t as student
 
 from hydroid.arrays import Array, Mask, record, rms
 from hydroid.parameters import ParameterSet
 from hydroid.posterior.error_model import ErrorModel, Likelihood, likelihood_at
+from hydroid.posterior.freedom import degrees_of_freedom
 from hydroid.posterior.linear import Linear, linearised, white_posterior
 from hydroid.posterior.posterior import (
-    NORMAL,
+    COVERAGE,
     UNIDENTIFIABLE_ABOVE,
     WEAK_PRIOR,
     Posterior,
@@ -183,9 +186,18 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
     held = at_bound & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.restricted(~held | held.all())
     shown = fitted.errors(whole.innovations[None])
-    errors = likelihood.shown
+    errors = likelihood.shown.simplest(shown[0])
     scatters = _scatters(likelihood, errors, linear.effects)
     posterior = _posterior(linear, scatters)
+    freedom = degrees_of_freedom(
+        errors,
+        fitted,
+        shown[0],
+        linear.effects,
+        scatters.sum(axis=0) + linear.prior_scatter,
+    )
+    quantile = float(student.ppf(0.5 + COVERAGE / 2, freedom))
+    posterior = replace(posterior, quantile=quantile)
     relative = linear.spread(posterior.deviations)
     effects = 0.01 * rms(fitted.errors(whole.slopes), axis=1)
     sensitivity = whole.spread(np.where(whole.diverging, np.nan, effects))
@@ -202,7 +214,7 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
         sensitivity=sensitivity,
         posterior=posterior,
         relative=relative,
-        interval=ends(parameters, linear.box, NORMAL * relative),
+        interval=ends(parameters, linear.box, quantile * relative),
         status=status,
     )
 

@@ -13,6 +13,9 @@ C is computed from one singular value decomposition J = V D U as C^-1 = G' G wit
 L^-1 D V', L L' = U S U'. No product J J' is formed. The weak prior on every parameter
 (`WEAK_PRIOR`), one more row each, makes J regular.
 
+Intervals are those of Student's t, as S comes from errors too (`freedom`). It is that of
+an error model without the numbers that the errors hardly ask for.
+
 The covariance is a local, first-order approximation. It assumes that the model is
 right: a wrong model shifts the estimate by more than an interval says (`by_log`,
 `whiteness`). A parameter within a tenth of a standard deviation of a bound is held

@@ -15,6 +15,7 @@ from linear_problem import (
     slow,
     white,
 )
+from scipy.stats import t as student
 
 from hydroid.posterior.identifiability import THRESHOLD, profile
 from hydroid.posterior.uncertainty import Flag, uncertainty
@@ -67,6 +68,23 @@ def test_the_covariance_is_that_of_least_squares_so_weighed_by_the_errors_as_the
     np.testing.assert_allclose(
         found.standard_deviation, np.sqrt(np.diag(expected)), rtol=1e-5
     )
+
+
+def test_white_noise_has_as_many_degrees_of_freedom_as_samples():
+    """Its variance is known to 2 / T of its square (Satterthwaite), and what lasts
+    counts less often."""
+    columns, rng = slow(3), np.random.default_rng(12)
+    quantiles = []
+    for phi in (0.0, AR1):
+        measured = THETA @ columns + ar1(rng, 1000, phi, 0.1 * DEG)
+        problem = Linear(columns, measured, THETA)
+        theta = least_squares(columns, measured)
+        numbers = white(0.1) if phi == 0.0 else None
+        found = uncertainty(problem, theta, numbers=numbers)
+        quantiles.append(found.posterior.quantile)
+    assert quantiles[0] == pytest.approx(student.ppf(0.975, 1000), rel=1e-3)
+    # what the errors of 0.15 s leave of 10 s is some tens of independent samples
+    assert student.ppf(0.975, 100) < quantiles[1] < student.ppf(0.975, 5)
 
 
 def test_an_exact_null_direction_has_no_interval_and_leaves_the_others_theirs():

@@ -76,8 +76,10 @@ def analyse(
     """Find which parameters, and which combinations of parameters, the logs determine.
 
     Prints the standard deviation and the 95 % interval of each parameter, and the
-    combinations that the logs do not determine. The page shows priors beside
-    posteriors, correlations, and profiles as curves.
+    combinations that the logs do not determine. It also writes a page: the prior and
+    posterior of each parameter, the correlations, and the profiles. A profile is the
+    lowest error that a fit can reach where one parameter is held at each of several
+    values.
 
     Example: hydroid analyse LOG.csv --fit runs/hyd --profile A_A
 

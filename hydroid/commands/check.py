@@ -300,8 +300,8 @@ def convert(
 
     Args:
         out (OUT.csv): The CSV to write.
-        config (YAML): Settings that map the columns (`log`): a file, or the name of a
-            shipped config [default: the columns are guessed, and each guess is
+        config (YAML): Settings whose section `log` says what each column is: a file, or
+            the name of a config that comes with hydroid [default: the columns are guessed, and each guess is
             printed].
         set (KEY=VALUE): Replace a setting of --config.
 

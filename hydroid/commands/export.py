@@ -47,19 +47,20 @@ def export(
 ) -> Result[list[str]]:
     """Write a fitted machine for other programs.
 
-    parameters: draws (random sets of all parameters that agree with the logs about as well
-    as the fit), the range of each parameter, and errors of the model. table: steady speed of
-    each joint against its command, as CSV for a PLC. urdf: your own file with the
-    masses of the fit. mjcf: a model that MuJoCo simulates alone. linear: A, B, C, D and
-    delays near one pose and command, as JSON, and a page with step response and Bode
-    plot. fmu: FMI 2 for co-simulation.
+    --to says in which form. --to parameters: draws (random sets of all parameters that
+    agree with the logs about as well as the fit), the range of each parameter, and errors
+    of the model. --to table: steady speed of each joint against its command, as CSV for a
+    PLC. --to urdf: your own file with the masses of the fit. --to mjcf: a model that
+    MuJoCo simulates alone. --to linear: A, B, C, D and delays near one pose and command,
+    as JSON, and a page with step response and Bode plot. --to fmu: FMI 2 for
+    co-simulation.
 
     Example: hydroid export runs/hyd --to parameters --draws 100
 
         hydroid.export("runs/a", to="table", out="speeds")
 
     Args:
-        fit (RUN|YAML): A fit: its run folder, or a plant saved in Python.
+        fit (RUN|YAML): A fit: its run folder, or a folder that Plant.save wrote in Python.
         to (KIND): parameters, table, urdf, mjcf, linear or fmu.
         out (DIR): Folder of the files [default: runs/export; in Python nothing is
             written].

@@ -49,8 +49,9 @@ def follow(
 
     The commands are a feed-forward: play them without feedback. They take dead band, valve
     curve, load, pump, delay and lags into account. Where a joint cannot be as fast as
-    asked, hydroid says so and takes the nearest speed. It also predicts the error with
-    a band, and writes a page with the arm in motion.
+    asked, hydroid says so and takes the nearest speed. It also predicts the error of
+    each joint, and the band that holds this error with 95 % probability, and writes a
+    page with the arm in motion.
 
     Example: hydroid follow TRAJECTORY.csv --fit runs/hyd --out commands.csv
 
@@ -62,9 +63,9 @@ def follow(
             the fit's logs. Or the tip's position over time: columns time_s, x_m, y_m and
             z_m, or dx_m, dy_m and dz_m from where the tip starts. The tip is the
             point (site) `payload` of the arm's file; without it, the end of the last
-            link. Joints without a column, and joints that take no commands, stand
-            still: at the first angles of the fit's first log, or in the pose of --set
-            start_pose=NAME.
+            link. In a file of joint angles, joints without a column stand still;
+            joints that take no commands always do. They stand at the first angles of
+            the fit's first log, or in the pose of --set start_pose=NAME.
         out (LOG.csv): The commands and the angles asked for, in the columns and units
             of the fit's logs; the page has the same name [default:
             runs/follow/commands.csv; in Python nothing is written].

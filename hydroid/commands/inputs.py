@@ -45,7 +45,7 @@ SHARED = f"""
     out (DIR): Folder for the tables [default: runs/COMMAND; in Python nothing is
         written].
     config (YAML): Settings: the fit.yaml that `hydroid init` wrote for your machine.
-        Or the name of a file that comes with hydroid, for its arm:
+        Or, for the arm that comes with hydroid, the name of its settings:
         fit-mech or fit-hyd.
     set (KEY=VALUE): Replace a setting, such as search.ga.generations=80.
     repair: Fill gaps in the logs that are not longer than the setting log.repair_s (0.1 s),

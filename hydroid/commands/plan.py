@@ -159,8 +159,8 @@ def design(
         logs (LOG): Logs that you already have. The experiment is designed to add to them.
         config (YAML): Settings; not needed if --fit is a run folder, which has its own.
         duration (S): Length of the experiment [s].
-        joints (2,3): Joints to drive, by number or name [default: those of
-            outputs].
+        joints (2,3): Joints to drive, by number or name [default: the joints that the
+            setting `outputs` lists as measured].
 
     Raises:
         SettingsError: limits that no experiment keeps.

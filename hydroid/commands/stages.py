@@ -109,9 +109,10 @@ def fit_hyd(
 ) -> FitResult:
     """Estimate the hydraulic actuators (stage 2).
 
-    By default it estimates piston areas, valve openings, onsets (the
-    voltages at the smallest commands), delay, damping and friction. The config can free more, such as
-    the amplifier's currents and the solenoid. Writes a run folder as fit-mech does.
+    By default it estimates piston areas, valve openings, onsets (the voltage that the
+    amplifier gives the valve at the smallest command, of each sign), delay, damping and
+    friction. The config can free more, such as the amplifier's currents and the
+    solenoid. Writes a run folder as fit-mech does.
 
     Example: hydroid fit-hyd LOG.csv --config mine/fit.yaml --out runs/hyd
 
@@ -122,8 +123,9 @@ def fit_hyd(
         out (DIR): Run folder [default: runs/fit-hyd; in Python nothing is
             written].
         mech (RUN|YAML): Stage 1: its run folder, or a YAML file of its values. The
-            masses are fixed at these values. Without this option, the masses are those of the
-            arm's file; those that the settings have as free parameters are estimated.
+            masses are fixed at these values. Without this option, masses
+            that are free parameters in the settings are estimated, and all others are
+            taken from the arm's file.
 
     Raises:
         HydroidError: an input or a folder that cannot be used.
@@ -361,8 +363,8 @@ def adapt(
     Args:
         logs (LOG): The new logs.
         free (NAME,NAME): Parameters to free [default: those that help. hydroid tries
-            masses, pump, tip_load, and differences between groups of logs, such as
-            days, if log.groups names groups].
+            masses, pump and tip_load. If log.groups names groups of logs, such as
+            days, it also tries parameters that may differ from group to group].
         out (DIR): Run folder [default: runs/adapt; in Python nothing is written].
         set (KEY=VALUE): Replace a setting of the fit, such as
             refinement.iterations=100.

@@ -63,8 +63,9 @@ def validate(
         print(validated.result[0]["shoulder"].rms)  # [deg]
 
     Args:
-        fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a plant saved in Python,
-            or a YAML file of parameter values. Repeat the option to compare several.
+        fit (RUN|YAML): A fit: its run folder, its estimate.yaml, a folder that
+            Plant.save wrote in Python, or a YAML file of parameter values.
+            Repeat the option to compare several.
         tolerance (0.001 to 90): The rms error that you accept at every joint [deg]. To give each
             joint its own: --set 'tolerance_deg={boom: 2, arm: 1}' [default: the
             fit's, or else 2 % of a joint's travel].

@@ -123,8 +123,8 @@ def view(
     set: "SettingChanges" = None,
     repair: bool = False,
 ) -> "Result[Clearance | None]":
-    """Show the moving arm in MuJoCo's viewer, in real time, beside the ghost of the
-    measured one.
+    """Show the simulated arm in motion in MuJoCo's viewer, in real time, and a pale copy
+    of it that moves as the measured arm did.
 
     Without a log, the sliders in the panel "Control" on the right set the commands in
     %. Backspace restarts. With -o FILE it writes a film or a picture instead. That
@@ -144,7 +144,8 @@ def view(
             in the arm's file and under `hydraulics` in the settings].
         span (FROM:TO): Part of the log to film [s], such as 10:20 [default: all].
         collisions: Instead of showing the arm, find where it touches itself, its base or
-            the floor during the log. With --arm the carrier and the other arm count too.
+            the floor during the log. With --arm also where
+            it touches the other arm, or the body that carries both.
             The exit status is 1 if anything touches.
         config (YAML): Settings [default: config.yaml in the folder of the estimate,
             or else fit-hyd].

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 from hydroid.arrays import Array, Mask
 from hydroid.posterior.course import Course
@@ -30,8 +30,6 @@ LONGEST = 30.0
 """time constant of a lasting error at most [s]: what is longer is drift (ours)"""
 FIRST_TIME = 0.3
 """time constant of a lasting error with which the search for the numbers begins [s]"""
-WITHOUT_DRIFT = np.array([1.0, 0.0, 0.0, 1.0, 1.0])
-"""part of each of NUMBERS that is left without a drift"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
 
@@ -153,60 +151,26 @@ def most_likely(
     a guess that is mostly noise, and at one that is mostly drift.
     """
     square = max(mean_square(pairs), least)
-    bounds = _bounds(square, least, given)
+    bounds = np.log(_bounds(square, least, given))
+
+    def cost(logarithms: Array) -> float:
+        values = np.exp(logarithms)
+        return sum(
+            _negative_log_likelihood(course, error, values) for course, error in pairs
+        )
+
     starts = _guesses(pairs, square) if start is None else (start,)
-    ended = [_search(pairs, bounds, numbers) for numbers in starts]
-    return min(ended, key=lambda end: end.cost).numbers
-
-
-def fewest(pairs: Pairs, least: float, given: float, found: Array) -> Array:
-    """Return the most likely NUMBERS without a drift, or of noise alone, where errors
-    are hardly less likely by them than by those `found`.
-
-    Each number that is not 0 costs one unit of the log-likelihood (H. Akaike, *A new
-    look at the statistical model identification*, 1974). So what wanders by chance is
-    no drift. The others are arguments of `most_likely`.
-    """
-    if not found[1:4].any():
-        return found  # noise alone
-    square = max(mean_square(pairs), least)
-    bounds = _bounds(square, least, given)
-    steady, _ = _guesses(pairs, square)
-    starts = [noise_and_drift(square), steady * WITHOUT_DRIFT]
-    if found[3] > 0.0:
-        starts.append(found * WITHOUT_DRIFT)
-    ended = [_search(pairs, bounds, numbers) for numbers in starts]
-    ended.append(_End(_negative_log(pairs, found), found))
-    return min(ended, key=lambda end: end.cost + _count(end.numbers)).numbers
-
-
-def _count(numbers: Array) -> int:
-    """Return how many NUMBERS are not 0: a time counts with what lasts for it."""
-    return np.count_nonzero(numbers[:4]) + int(numbers[3] != 0.0)
-
-
-class _End(NamedTuple):
-    """Where a search for numbers ended: their negative log-likelihood, and NUMBERS."""
-
-    cost: float
-    numbers: Array
-
-
-def _search(pairs: Pairs, bounds: Array, start: Array) -> _End:
-    """Search for the most likely NUMBERS from a start; what is 0 there stays 0."""
-    ends = np.log(bounds)
-    absent = start == 0.0
-    ends[absent, 1] = ends[absent, 0]
-    # a number may be 0, which has no logarithm
-    begin = np.clip(np.log(np.maximum(start, 1e-300)), *ends.T)
-    result = minimize(
-        lambda logarithms: _negative_log(pairs, np.exp(logarithms)),
-        begin,
-        method="L-BFGS-B",
-        bounds=ends,
-        options={"maxiter": 60, "ftol": 1e-6},  # of a log-likelihood in the thousands
-    )
-    return _End(result.fun, np.where(absent, 0.0, np.exp(result.x)))
+    options = {"maxiter": 60, "ftol": 1e-6}  # of a log-likelihood in the thousands
+    ended = list[OptimizeResult]()
+    for numbers in starts:
+        # a number may be 0, which has no logarithm
+        begin = np.clip(np.log(np.maximum(numbers, 1e-300)), *bounds.T)
+        result = minimize(
+            cost, begin, method="L-BFGS-B", bounds=bounds, options=options
+        )
+        ended.append(result)
+    best = min(ended, key=lambda result: result.fun)
+    return np.exp(best.x)
 
 
 def _bounds(square: float, least: float, given: float) -> Array:
@@ -242,15 +206,11 @@ def mean_square(pairs: Pairs) -> float:
     return float(np.mean(used**2))
 
 
-def _negative_log(pairs: Pairs, numbers: Array) -> float:
-    """Return the negative log-likelihood of errors, but for a constant."""
+def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> float:
+    carry, step = _model(course, numbers)
     sensor = float(numbers[0])
-    total = 0.0
-    for course, error in pairs:
-        carry, step = _model(course, numbers)
-        start = sensor / course.readings
-        total += _cost(error, course.used, sensor, start, step, carry)
-    return total
+    start = sensor / course.readings
+    return _cost(error, course.used, sensor, start, step, carry)
 
 
 @njit(cache=True)

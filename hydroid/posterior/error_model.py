@@ -47,7 +47,6 @@ from hydroid.posterior.course import Course, make_course
 from hydroid.posterior.error_filter import (
     Filter,
     Pairs,
-    fewest,
     make_filter,
     mean_square,
     most_likely,
@@ -160,19 +159,6 @@ class ErrorModel:
             start = numbers[i] if nearby else None
             numbers[i] = most_likely(
                 self._pairs(i, errors), _least(signal), float(self.given[i]), start
-            )
-        return replace(self, numbers=numbers)
-
-    def simplest(self, errors: Array) -> "ErrorModel":
-        """Return the error model without the numbers that weighted output errors, (R,),
-        hardly ask for (`error_filter.fewest`)."""
-        numbers = self.numbers.copy()
-        for i, signal in enumerate(self.signals):
-            numbers[i] = fewest(
-                self._pairs(i, errors),
-                _least(signal),
-                float(self.given[i]),
-                numbers[i],
             )
         return replace(self, numbers=numbers)
 

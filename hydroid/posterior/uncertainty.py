@@ -13,8 +13,7 @@ C is computed from one singular value decomposition J = V D U as C^-1 = G' G wit
 L^-1 D V', L L' = U S U'. No product J J' is formed. The weak prior on every parameter
 (`WEAK_PRIOR`), one more row each, makes J regular.
 
-Intervals are those of Student's t, as S comes from errors too (`freedom`). It is that of
-an error model without the numbers that the errors hardly ask for.
+Intervals are those of Student's t, as S comes from errors too (`freedom`).
 
 The covariance is a local, first-order approximation. It assumes that the model is
 right: a wrong model shifts the estimate by more than an interval says (`by_log`,
@@ -189,7 +188,7 @@ def uncertainty_from(likelihood: Likelihood, whole: Linear) -> Uncertainty:
     held = at_bound & (white <= UNIDENTIFIABLE_ABOVE)
     linear = whole.restricted(~held | held.all())
     shown = fitted.errors(whole.innovations[None])
-    errors = likelihood.shown.simplest(shown[0])
+    errors = likelihood.shown
     scatters = _scatters(likelihood, errors, linear.effects)
     posterior = _posterior(linear, scatters)
     freedom = degrees_of_freedom(

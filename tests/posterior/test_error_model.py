@@ -203,26 +203,6 @@ def test_the_numbers_are_the_most_likely_from_whatever_numbers_before(before, la
     assert cost(found) == pytest.approx(cost(from_truth), abs=0.5)
 
 
-def test_numbers_that_the_errors_hardly_ask_for_are_none():
-    """Of logs without a drift and with one; and noise alone stays as it is."""
-    logs = [course_of(2000, 2000 * i) for i in range(3)]
-    with_drift, none = 0, 0
-    for seed in range(10):
-        rng = np.random.default_rng(seed)
-        for true in (np.array([SENSOR, 0.0, 0.0, 2e-5, 0.5]), LASTING):
-            row = np.concatenate([drawn(rng, one, true)[0] for one in logs])
-            found = model_of_errors(logs, true).estimated(row).simplest(row)
-            drifts = found.numbers[0, 1] + found.numbers[0, 2] > 0.0
-            if true[1] > 0.0:
-                with_drift += drifts
-            else:
-                none += not drifts
-    assert with_drift == 10
-    assert none >= 8
-    noise = model_of_errors(logs, np.array([SENSOR, 0.0, 0.0, 0.0, SHORTEST]))
-    np.testing.assert_array_equal(noise.simplest(row).numbers, noise.numbers)
-
-
 def test_white_noise_alone_is_weighed_by_its_mean_square_and_has_no_drift():
     rng = np.random.default_rng(10)
     course = replace(course_of(1000, weight=2.0), used=np.arange(1000) % 2 == 0)

@@ -143,7 +143,7 @@ def _path_lines(
         start = spelt(tip.place(followed.log.angle[0]))
         lines.append(
             f"The tip is {tip.tip.what}. It starts at {start}. By the model it stays "
-            f"within {away:.3g} mm of the path."
+            f"within {away:.3g} mm of where it should be at each time."
         )
     lines += _unseen_lines(followed, verdicts, tip)
     if followed.lead_s:

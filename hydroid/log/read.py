@@ -1,6 +1,6 @@
 """A log file -> `Log`: open, map, repair, check, resample."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from hydroid.log.lost_signals import without_lost_signals
 from hydroid.log.mapping import Ranges, map_signals, match_columns, measured_signals
 from hydroid.log.motion_checks import check_motion
 from hydroid.log.repair import between_gaps, resample, without_bad_rows
-from hydroid.log.table import Recording, Table
+from hydroid.log.table import Recording, Signal, Table
 from hydroid.log.work import with_work, without_work
 from hydroid.progress import Progress, no_progress
 from hydroid.settings.arm import Arm
@@ -34,8 +34,9 @@ class Reading:
 
     Attributes:
         outputs: joints (numbers, from 1) whose angles a fit compares, so that the file
-            must hold them; None: a joint whose angle column the file lacks is
-            unmeasured, which else is an error.
+            must hold them; None: commands count alone: a joint whose angle column the
+            file lacks is unmeasured, which else is an error, and what the angles do is
+            not judged.
         arm: whose cylinders have lengths that stand for angles; a positive command
             turns its joints `backward` to negative angles.
         repair: whether holes up to `repair_s` of the settings are filled.
@@ -132,12 +133,8 @@ def check_parts(
                 recording, settings, len(ranges), findings, repair=reading.repair
             )
         del recording  # a long one is large
-        for part in parts:
-            backward = ()
-            if reading.arm:
-                backward = reading.arm.backward
-            outputs = reading.outputs or ()
-            findings += check_motion(part, signals, outputs, backward, settings.delay_s)
+        if reading.outputs is not None:
+            findings += _of_motion(parts, signals, settings, reading)
     except LogError as error:
         numbers = {"what": error.what, "hint": error.hint}
         findings.append(
@@ -145,6 +142,19 @@ def check_parts(
         )
         parts = []
     return parts, by_level(findings)
+
+
+def _of_motion(
+    parts: Sequence[Log],
+    signals: Sequence[Signal],
+    settings: LogSettings,
+    reading: Reading,
+) -> Iterator[LogFinding]:
+    """Yield what the motion in the parts of a log says against the settings."""
+    backward = reading.arm.backward if reading.arm else ()
+    outputs = reading.outputs or ()
+    for part in parts:
+        yield from check_motion(part, signals, outputs, backward, settings.delay_s)
 
 
 def _read(

@@ -68,6 +68,10 @@ class Draws:
     def __len__(self) -> int:
         return len(self.theta)
 
+    def __repr__(self) -> str:
+        count = len(self.names)
+        return f"<Draws: {len(self)} of {count} parameters; {self.model.source}>"
+
     @property
     def names(self) -> tuple[str, ...]:
         """Of the parameters, (P,)."""

@@ -28,6 +28,8 @@ ERRORS_HEADER = (
 """of the table of errors: standard deviations in the unit, after 1 s and after a way of
 1 unit of those that grow"""
 
+FAR = 100
+"""standard deviations beyond which a machine is as good as impossible"""
 RANGES_NOTE = """\
 draws.csv   machines that the logs do not rule out, one per row: all parameters together
 ranges.csv  the estimate of each parameter, and the range of its draws (95 %)
@@ -102,7 +104,7 @@ def parameter_files(draws: Draws) -> dict[str, str]:
         "draws.csv": csv_text([draws.names, *draws.theta.tolist()]),
         "ranges.csv": csv_text([header, *ranges]),
         "errors.csv": csv_text([ERRORS_HEADER, *_error_rows(draws)]),
-        "README.txt": RANGES_NOTE.format(apart=f"{draws.apart:.3g}"),
+        "README.txt": RANGES_NOTE.format(apart=_spelt(draws.apart)),
     }
 
 
@@ -123,3 +125,8 @@ def _error_rows(draws: Draws) -> list[tuple[str | float, ...]]:
         lasted = factor * math.sqrt(lasting), seconds
         rows.append((joint.name, unit, *own, grown, *lasted))
     return rows
+
+
+def _spelt(apart: float) -> str:
+    """Return a distance in standard deviations; beyond FAR its size says nothing."""
+    return f"more than {FAR}" if apart > FAR else f"{apart:.3g}"

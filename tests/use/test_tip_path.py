@@ -96,7 +96,8 @@ def test_an_arm_without_a_site_is_led_by_the_end_of_its_last_link(tmp_path: Path
     place = tip.place(start)
     assert line_ == (
         f"The tip is the end of jaw_left. It starts at x {place[0]:.3f}, y {place[1]:.3f}, "
-        f"z {place[2]:.3f} m. By the model it stays within {away:.3g} mm of the path."
+        f"z {place[2]:.3f} m. By the model it stays within {away:.3g} mm of where "
+        "it should be at each time."
     )
     along = followed.result
     wish = np.array([tip.place(pose) for pose in along.log.angle])

@@ -7,6 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from conftest import candidates
+from hydroid.simulation.rolls import ROLLS
 from made_logs import at_rest
 
 from hydroid import load_settings
@@ -25,7 +26,6 @@ from hydroid.rungs import (
 from hydroid.settings.hydraulics import HydraulicSettings
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
-from hydroid.simulation.rolls import ROLLS
 from hydroid.simulation.scenario import Scenario
 
 SWITCHED_ON = {

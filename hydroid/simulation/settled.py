@@ -255,9 +255,7 @@ def settled_speeds(
     actuator has 0.
     """
     velocity = np.zeros(angle.shape)
-    law = LAWS[rung]
-    settle = _compiled(law.rod, law.reaches)
-    settle(plugin, Poses(angle, load), False, command.copy(), velocity)
+    _call(rung, plugin, Poses(angle, load), False, command.copy(), velocity)
     return velocity
 
 
@@ -272,7 +270,15 @@ def settled_commands(
     """
     command = np.zeros(angle.shape)
     reached = velocity.copy()
-    law = LAWS[rung]
-    settle = _compiled(law.rod, law.reaches)
-    settle(plugin, Poses(angle, load), True, command, reached)
+    _call(rung, plugin, Poses(angle, load), True, command, reached)
     return command, reached
+
+
+def _call(rung: Rung, plugin: Plugin, *arguments: Any) -> None:
+    """Settle joints by the law of a rung."""
+    if not rung.has("pump_flow"):
+        endless = plugin.coefficients.copy()
+        endless["pump_flow"] = np.inf
+        plugin = plugin._replace(coefficients=endless)
+    law = LAWS[rung]
+    _compiled(law.rod, law.reaches)(plugin, *arguments)

@@ -235,7 +235,7 @@ def test_plants_and_batches_of_a_rung_settle_to_its_speeds(added: Rung):
     batch = PlantBatch([alone])
     held = np.array([HELD.get(name, 0.0) for name in plant.names])
     angles = []
-    for _ in range(40):
+    for _ in range(150):
         angles.append(plant.step(held))
         assert np.array_equal(batch.step(held)[0], angles[-1])
     before, here, after = angles[-3:]
@@ -252,7 +252,7 @@ def test_the_bench_of_a_rung_has_its_speeds(added: Rung):
     arm = model.settings.arm
     log = at_rest(arm.pose("study"), np.zeros((2, len(arm.joints))))
     bench = make_bench(model.settings, [log], 2)
-    movement = bench.movement(40.0, seconds=0.4)
+    movement = bench.movement(40.0, seconds=1.5)
     angles = movement.angles(one)
     *_, before, after = movement.speeds_of(angles)[0]
     there = replace(bench, angle=float(angles[0, -2]))

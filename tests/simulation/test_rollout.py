@@ -121,7 +121,7 @@ def test_a_law_that_calls_through_a_module_is_refused():
 def test_the_key_changes_with_a_files_text(tmp_path: Path):
     file = tmp_path / "one.py"
     keys = set[int]()
-    function = FunctionType(compile("", str(file), "exec"), {})
+    function = FunctionType(compile("", str(file), "exec"), {"__name__": "one"})
     for text in ("a = 1\n", "a = 2\n"):
         file.write_text(text)
         keys.add(kernel.source_key(function))

@@ -1,7 +1,7 @@
 """The rungs: the models that an arm can have, from the poorest to the richest.
 
 A rung says here what of the machine its model has, and how finely it steps. How its arm
-rolls stands beside the law, in `simulation/`: `simulation.rolls` finds it by the rung.
+rolls, and how fast joints settle, is its law: `simulation.laws` has that of each rung.
 A fit may climb from one rung of its stage to the next (`fitting.ladder`).
 """
 
@@ -23,9 +23,8 @@ class Rung:
         name: in `simulation.model` and in the names of estimates.
         stage: of the fits that it belongs to.
         at_once: whether speeds follow valve and load at once, without inertia. One step
-            a sample is then enough, joints that follow a log take its angles, and held
-            commands lead to the speeds of `valve.rod_speed`. Valves open as
-            `simulation.openings` says, whatever the arm does.
+            a sample is then enough, and joints that follow a log take its angles.
+            Valves open as `simulation.openings` says, whatever the arm does.
         lacks: quantities that have no effect, each side by itself.
     """
 

@@ -176,6 +176,7 @@ def fit(
         RunError: `out` holds another run or cannot be written, or every simulation
             diverged.
     """
+    _refuse_lacked(settings)
     read = read_logs(logs, settings, fitted=True)
     _refuse_copies(read)
     files = [*dict.fromkeys(log_file(log.source) for log in read)]
@@ -204,6 +205,20 @@ def fit(
         )
         _store(folder, result)
     return result
+
+
+def _refuse_lacked(settings: FitSettings) -> None:
+    """Refuse to estimate what the model does not have: no log would tell it.
+
+    Terms are left alone: each is tried on the models that have it.
+    """
+    for name, parameter in settings.parameters.items():
+        wanted = parameter.fixed is None and parameter.term is None
+        if wanted and not any(rung.has(parameter.quantity) for rung in settings.rungs):
+            model = settings.simulation.model
+            what = f"the model {model} has no {parameter.quantity}"
+            hint = "leave it out, or choose another simulation.model"
+            raise SettingsError(what, f"parameters.{name}", hint)
 
 
 def _refuse_copies(logs: "Sequence[Log]") -> None:

@@ -34,9 +34,10 @@ bit.
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
 import hashlib
+from collections.abc import Iterator
 from inspect import getfile
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,18 +64,50 @@ RAMP_WAY = 1.0 / 2.0
 
 def source_key(*inlined: FunctionType) -> int:
     """Return a number that changes with the text of the hydraulics' files, and of those
-    of `inlined` functions.
+    from which `inlined` functions take code in.
 
     Numba keys its cache on one file only. As a default argument of a compiled function,
     this number makes all files part of the key from which the function takes code in.
     """
-    files = [
-        *sorted(Path(__file__).parent.glob("*.py")),
-        Path(linkage.__file__),
-        *(Path(getfile(function)) for function in inlined),
-    ]
-    texts = b"".join(file.read_bytes() for file in files)
+    seen = set[FunctionType]()
+    for function in inlined:
+        _follow(function, seen)
+    files = {Path(linkage.__file__), *(Path(getfile(one)) for one in seen)}
+    files.update(Path(__file__).parent.glob("*.py"))
+    texts = b"".join(file.read_bytes() for file in sorted(files))
     return int.from_bytes(hashlib.sha256(texts).digest()[:7])
+
+
+def _follow(function: FunctionType, seen: set[FunctionType]) -> None:
+    """Add a function and those that it takes code in from, of hydroid and of its own
+    package.
+
+    Raises TypeError: it names a module of theirs, whose functions nobody follows.
+    """
+    if function in seen:
+        return
+    seen.add(function)
+    ours = {"hydroid", _package(function.__module__)}
+    for name in _names(function.__code__):
+        used: Any = function.__globals__.get(name)
+        if isinstance(used, ModuleType) and _package(used.__name__) in ours:
+            raise TypeError(f"{function.__name__}: import what it uses of {name}")
+        # what is compiled by itself is taken in, too
+        used = getattr(used, "py_func", used)
+        if isinstance(used, FunctionType) and _package(used.__module__) in ours:
+            _follow(used, seen)
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    """Yield the names that a function's code uses, its inner functions' among them."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _package(module: str) -> str:
+    return module.partition(".")[0]
 
 
 SOURCE = source_key()

@@ -11,6 +11,7 @@ is met once per call.
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import Any, NamedTuple
 
 import mujoco
@@ -26,17 +27,8 @@ from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import Plugin, source_key
 from hydroid.mjcf import quiet_mujoco
 from hydroid.plant.plant import PHYSICS, Plant
-from hydroid.rungs import Rung
-from hydroid.simulation.gravity import hold
-from hydroid.simulation.quasi_static import roll_quasi_static, share_pump
-from hydroid.simulation.rollout import Course, Handles, Trace, bind, roll, write_sample
-from hydroid.simulation.rolls import ROLLS
-
-# the files of all rollouts below are in the key of numba's cache
-SOURCE = source_key(write_sample, share_pump, hold)
-QUASI_STATIC: dict[Callable[..., None], bool] = {roll: False, roll_quasi_static: True}
-"""which branch of `_roll_some` is a rollout's: numba's cache takes no function that is
-handed over"""
+from hydroid.simulation.laws import LAWS
+from hydroid.simulation.rollout import Course, Handles, Trace, bind
 
 
 def _typed_pointer(typing: Any, address: Any) -> Any:
@@ -91,17 +83,13 @@ def _addresses(plant: Plant) -> list[int]:
     return [model._address, data._address, *of_arrays]  # pyright: ignore[reportPrivateUsage]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _roll_some(
-    rows,
-    shared: Handles,
-    plugin: Plugin,
-    plants: PlantRows,
-    quasi_static: bool,
-    source: int = SOURCE,
-) -> None:
-    """Roll some plants out, from rows[0] to before rows[1]; `shared` has what is alike
-    of all."""
+@compilable
+def _roll_some(rows, shared, plugin, plants, roll) -> None:
+    """Roll some plants out by a rollout, from rows[0] to before rows[1].
+
+    `shared`, of Handles, and the plugin have what is alike of all; plants are
+    PlantRows.
+    """
     joints = shared.angle.size
     entries = shared.mass.size
     bodies = shared.links.size
@@ -146,23 +134,20 @@ def _roll_some(
             plants.commands[i], plants.torque[i], nothing, no_openings, at_references
         )
         trace = Trace(plants.angle[i], no_states)
-        if quasi_static:
-            roll_quasi_static(handles, actuators, plants.state[i], course, trace)
-        else:
-            roll(handles, actuators, plants.state[i], course, trace)
+        roll(handles, actuators, plants.state[i], course, trace)
         finite = np.isfinite(handles.angle).all()
         plants.failed[i] = handles.warnings.any() or not finite
 
 
-def _is_quasi_static(rung: Rung) -> bool:
-    """Return the branch of `_roll_some` that rolls the plants of a rung.
+@cache
+def _compiled(roll: Any) -> Any:
+    """Return `_roll_some` by the rollout of a rung."""
 
-    Raises SettingsError: it has none.
-    """
-    branch = QUASI_STATIC.get(ROLLS[rung])
-    if branch is None:
-        raise SettingsError(f"cannot step the model {rung.name}", "a batch of plants")
-    return branch
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def roll_some(rows, shared, plugin, plants, source: int = source_key(roll)) -> None:
+        _roll_some(rows, shared, plugin, plants, roll)
+
+    return roll_some
 
 
 def copy_records(source: Structs, target: Structs) -> None:
@@ -395,15 +380,15 @@ class PlantBatch:
         )
         for row in range(n):
             self._take(row)
+        roll_some = _compiled(LAWS[first.rung].roll)
         self._calls: list[Callable[[], object]] = []
         for k in range(len(self._shares) - 1):
             call = bind(
-                _roll_some,
+                roll_some,
                 self._shares[k : k + 2].copy(),
                 parts.arm.handles,
                 parts.plugin,
                 self._plant_rows,
-                _is_quasi_static(first.rung),
             )
             self._calls.append(call)
 

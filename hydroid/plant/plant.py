@@ -26,6 +26,7 @@ from hydroid.plant.steady import SteadyArm, SteadyCommands, Weighing, by_name
 from hydroid.problem.bindings import Bindings
 from hydroid.quantity_table import MECHANICAL, QUANTITIES
 from hydroid.rungs import Rung
+from hydroid.simulation.laws import LAWS
 from hydroid.simulation.roles import roles
 from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, model_values
@@ -338,7 +339,7 @@ class Plant:
             SettingsError: a plant of stage 1, which has no valves.
         """
         settings = self.identified.settings
-        if settings.stage != "hyd":
+        if LAWS[settings.rung].rod is None:
             hint = "name a fit of stage 2"
             raise SettingsError(
                 "a gain gives torques, not speeds", self.identified.source, hint
@@ -353,7 +354,7 @@ class Plant:
             self._plugin,
             self._chain.joints,
             ranges,
-            settings.rung.at_once,
+            settings.rung,
         )
 
     def state(self) -> PlantState:

@@ -12,6 +12,7 @@ from hydroid.arm.locked import lock
 from hydroid.arrays import Array, Index, Mask, record
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.mjcf import quiet_mujoco
+from hydroid.rungs import Rung
 from hydroid.settings.arm import Arm
 from hydroid.simulation import Candidates
 from hydroid.simulation.rollout import SteppedArm
@@ -83,14 +84,14 @@ class SteadyArm:
         plugin: the actuators of V joints.
         columns: these joints among the arm's, 0-based, shape (V,).
         ranges: of the arm's joints [rad], shape (J, 2).
-        quasi_static: whether the law is that of the quasi-static model.
+        rung: whose law it is.
     """
 
     weighing: Weighing
     plugin: Plugin
     columns: Index
     ranges: Array
-    quasi_static: bool
+    rung: Rung
 
     def speeds(self, command: Array, pose: Array) -> Array:
         """Return settled speeds [rad/s] under commands [%] at angles [rad], all of
@@ -101,7 +102,7 @@ class SteadyArm:
             pose[:, self.columns],
             load[:, self.columns],
             command[:, self.columns],
-            quasi_static=self.quasi_static,
+            self.rung,
         )
         return self._spread(speeds)
 
@@ -122,7 +123,7 @@ class SteadyArm:
             pose[:, self.columns],
             load[:, self.columns],
             wished[:, self.columns],
-            quasi_static=self.quasi_static,
+            self.rung,
         )
         return self._spread(command), self._spread(reached)
 

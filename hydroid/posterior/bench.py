@@ -21,9 +21,10 @@ from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
 from hydroid.simulation import Candidates, Simulation, make_scenario
+from hydroid.simulation.lone import steady_velocity
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
-from hydroid.simulation.steady import NEAR, steady_velocity
+from hydroid.simulation.steady import NEAR
 
 ONSET = 0.1
 """part of the steady speed that is reached after the dead time"""
@@ -141,14 +142,12 @@ class Bench:
         """Return the joint's speeds at its angle under m commands [%] that are held,
         (n, m), unit per s.
 
-        They are those of `hydroid.simulation.steady`, positive where its angle grows.
+        They are those of `hydroid.simulation.lone`, positive where its angle grows.
         `loads` are its.
         """
         joint: Records = candidates.joints[:, self.joint - 1]  # pyright: ignore[reportAssignmentType]
-        at_once = self.settings.rung.at_once
-        return self.unit[0] * steady_velocity(
-            joint, self.angle, loads, commands, quasi_static=at_once
-        )
+        rung = self.settings.rung
+        return self.unit[0] * steady_velocity(joint, self.angle, loads, commands, rung)
 
     def movement(self, command: float, seconds: float = 1.2) -> "Movement":
         """Return the movement from the joint's angle under a command [%]."""

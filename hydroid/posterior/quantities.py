@@ -244,8 +244,7 @@ def oil(bench: Bench, candidates: Candidates, inertia: Array) -> Measured:
     and the seals' friction are left out of the damping.
     """
     c, travel, arm = actuator(bench, candidates)
-    # a model whose speeds follow at once knows of neither oil nor inertia
-    if not bench.settings.rung.at_once:
+    if bench.settings.rung.has("bulk_modulus"):
         volume_a = c.dead_volume
         volume_b = c.dead_volume
         if c.kind[0] == LINEAR:

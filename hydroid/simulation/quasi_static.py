@@ -30,24 +30,16 @@ what a log shows of both, a natural frequency and a damping ratio (`overshoot`).
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from hydroid.hydraulics.cylinder import weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
-from hydroid.hydraulics.kernel import (
-    Plugin,
-    make_pad,
-    source_key,
-    take_conditions,
-)
+from hydroid.hydraulics.kernel import make_pad, take_conditions
 from hydroid.hydraulics.oil import overshoot, store_oil
 from hydroid.hydraulics.pump import begin_line, centre_left, come_up, line_pressure
 from hydroid.hydraulics.valve import rod_speed
 from hydroid.simulation.gravity import hold, load_links
 from hydroid.simulation.rollout import write_sample
-
-SOURCE = source_key(write_sample, hold)
 
 
 @compilable
@@ -98,10 +90,33 @@ def turn(c, z, w, supply: float, limits, period: float) -> Any:
     return speed, after
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def roll_quasi_static(
-    arm, plugin: Plugin, state, course, trace, source: int = SOURCE
-) -> None:
+@compilable
+def quasi_static_rod(c, w, supply: float) -> Any:
+    """Speed of a rod [m/s] and the flow that it takes from the line [m³/s]."""
+    speed, drawn, _ = rod_speed(c, w, supply)
+    return speed if w.open_area > 0.0 else -speed, drawn
+
+
+@compilable
+def lone_quasi_static(coefficients, pad, angle: float, loads) -> float:
+    """Velocity [rad/s] of the only joint on the pump, as `Law.lone` has it."""
+    c = coefficients[0]
+    w = pad.joints[0]
+    line = pad.line[0]
+    weigh(c, w, angle, loads[1])
+    supply = c.supply_pressure
+    if c.pump_flow < np.inf:
+        driven = np.zeros(1, np.intp)
+        # where the search for the line's pressure begins
+        line.pressure = c.relief
+        line.centre = centre_left(coefficients, driven, pad.joints)
+        shared = line_pressure(coefficients, driven, pad.joints, line, 1.0)
+        supply = min(supply, shared)
+    return quasi_static_rod(c, w, supply)[0] / w.arm
+
+
+@compilable
+def roll_quasi_static(arm, plugin, state, course, trace) -> None:
     """Roll one candidate out, as `rollout.roll` does; joints that follow a log take its
     angle.
 

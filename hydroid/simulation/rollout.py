@@ -31,10 +31,10 @@ from numpy.typing import NDArray
 from hydroid.arrays import Array, Index, Structs
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import (
-    SOURCE,
     Plugin,
     look_ahead,
     make_pad,
+    source_key,
     take_conditions,
     take_over,
 )
@@ -133,7 +133,7 @@ class SteppedArm:
         columns: the moving joints with actuators, and those they couple with, shape
             (J,). The torques of the P others are given.
         steps: of MuJoCo in one sample.
-        rollout: the compiled one, with the arguments of `roll`, which it is by default.
+        rollout: with the arguments of `roll`, which it is by default.
         copies: how often the arm is in the model.
         links: as of `Handles`.
 
@@ -151,7 +151,7 @@ class SteppedArm:
         copies: int = 1,
         links: Structs = NO_LINKS,
     ) -> None:
-        self._roll = rollout or roll
+        self._roll = compiled(rollout or roll)
         self.copies = copies
         self.model = copy(model)
         self.data = mujoco.MjData(model)
@@ -306,10 +306,9 @@ def write_sample(arm, trace, state, k: int) -> None:
             trace.states[sample] = state
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def roll(arm, plugin: Plugin, state, course, trace, source: int = SOURCE) -> None:
-    """Roll one candidate out as `SteppedArm.roll` does; `source` is the kernel's, for
-    numba's cache."""
+@compilable
+def roll(arm, plugin, state, course, trace) -> None:
+    """Roll one candidate out as `SteppedArm.roll` does."""
     commands, torque, taken, _, conditions = course
     steps = torque.shape[0]
     past = commands.shape[0] - steps
@@ -328,6 +327,20 @@ def roll(arm, plugin: Plugin, state, course, trace, source: int = SOURCE) -> Non
             return
         take_over(plugin, state, arm, pad)
         write_sample(arm, trace, state, k)
+
+
+@cache
+def compiled(rollout: Any) -> Any:
+    """Return a rollout, which is `compilable`, as a function of its own.
+
+    Numba's cache tells the rollouts apart by what stands in the closure.
+    """
+
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def rolled(arm, plugin, state, course, trace, source: int = source_key(rollout)):
+        rollout(arm, plugin, state, course, trace)
+
+    return rolled
 
 
 class _Announcement(event.Listener):

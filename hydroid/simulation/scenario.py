@@ -20,9 +20,9 @@ from hydroid.rungs import GAIN, Stepping
 from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation.gravity import make_links
+from hydroid.simulation.laws import LAWS
 from hydroid.simulation.roles import Roles, roles
 from hydroid.simulation.rollout import AT_REFERENCES, NO_LINKS, SteppedArm
-from hydroid.simulation.rolls import ROLLS
 
 ARMATURE = 1e6
 """[kg·m²], against about 10 for the whole arm: the arm's torques move it by less than
@@ -316,7 +316,7 @@ class Chain:
     def stepped(self, model: mujoco.MjModel, steps: int, copies: int = 1) -> SteppedArm:
         """Return the arm of a model, or several copies of it, to be rolled out as its
         rung is, with a sample after so many steps."""
-        roll = ROLLS[self._stepping.rung]
+        roll = LAWS[self._stepping.rung].roll
         return SteppedArm(model, self.columns, steps, roll, copies, self._links)
 
     def start(

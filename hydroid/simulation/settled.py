@@ -14,6 +14,7 @@ out.
 # pyright: reportMissingParameterType=false
 # a law takes floats or arrays that broadcast, and compiled code whatever has its fields
 
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,17 +25,10 @@ from hydroid.hydraulics.cylinder import weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.pump import centre_left, delivery, lowest, past_valves
-from hydroid.hydraulics.seals import joint_friction
-from hydroid.hydraulics.valve import rod_speed
-from hydroid.simulation.steady import (
-    balanced_speed,
-    false_position,
-    illinois,
-    steady_opening,
-    surplus,
-)
+from hydroid.rungs import Rung
+from hydroid.simulation.laws import LAWS
+from hydroid.simulation.steady import false_position, illinois, steady_opening
 
-SOURCE = source_key(balanced_speed)
 FULL_COMMAND = 100.0  # [%]
 HALVINGS = 32
 """of the full command: to 2e-8 %"""
@@ -46,31 +40,7 @@ SETTLED = 1e-6
 
 
 @compilable
-def settled_rod(c, w, supply: float, quasi: bool) -> Any:
-    """Speed of a rod [m/s] and the flow that it takes from the line [m³/s], at the
-    opening `w.open_area`."""
-    if quasi:
-        speed, drawn, _ = rod_speed(c, w, supply)
-        return speed if w.open_area > 0.0 else -speed, drawn
-    if w.open_area == 0.0 and c.leakage == 0.0:
-        return 0.0, 0.0
-    return balanced_speed(supply, c, w, (c.a.area, c.b.area))
-
-
-@compilable
-def fast_enough(c, w, wished: float, supply: float, quasi: bool) -> bool:
-    """Whether a rod moves at least as fast as wished [m/s], in that direction, at the
-    opening `w.open_area`."""
-    sign = 1.0 if wished > 0.0 else -1.0
-    if quasi:
-        return sign * w.open_area > 0.0 and rod_speed(c, w, supply)[0] >= abs(wished)
-    areas = (c.a.area, c.b.area)
-    left = surplus(wished, supply, c, w, areas)[0]
-    return sign * left >= joint_friction(c, w.arm)
-
-
-@compilable
-def least_command(c, w, wished: float, supply: float, quasi: bool) -> float:
+def least_command(c, w, wished: float, supply: float, rod, reaches) -> float:
     """Least command [%] at which a rod moves as fast as wished [m/s]; the full one
     where none is enough."""
     if wished == 0.0:
@@ -81,7 +51,7 @@ def least_command(c, w, wished: float, supply: float, quasi: bool) -> float:
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         w.open_area = steady_opening(sign * middle, c)
-        if fast_enough(c, w, wished, supply, quasi):
+        if reaches(rod, c, w, wished, supply):
             high = middle
         else:
             low = middle
@@ -89,34 +59,33 @@ def least_command(c, w, wished: float, supply: float, quasi: bool) -> float:
 
 
 @compilable
-def nearest_command(
-    c, w, wished: float, command: float, supply: float, quasi: bool
-) -> float:
+def nearest_command(c, w, wished: float, command: float, supply: float, rod) -> float:
     """The least command that is enough, or the one below it where that is nearer to the
     wish.
 
     A valve that opens with a jump has a slowest speed.
     """
     w.open_area = steady_opening(command, c)
-    beyond = abs(settled_rod(c, w, supply, quasi)[0] - wished)
+    beyond = abs(rod(c, w, supply)[0] - wished)
     # two of the last halvings: surely on the other side of a jump
     below = command - np.sign(command) * 2.0 * FULL_COMMAND * 0.5**HALVINGS
     if below * command <= 0.0:
         below = 0.0
     w.open_area = steady_opening(below, c)
-    reached = settled_rod(c, w, supply, quasi)[0]
+    reached = rod(c, w, supply)[0]
     if abs(reached - wished) >= beyond:
         return command
     # no command at all rather than one that moves nothing
     return 0.0 if reached == 0.0 else below
 
 
-class Law(NamedTuple):
-    """What is sought: commands for speeds if `inverse`, or speeds; of the quasi-static
-    model or not."""
+class Sought(NamedTuple):
+    """What is sought: commands for speeds if `inverse`, or speeds; by what of a
+    `Law`."""
 
     inverse: bool
-    quasi: bool
+    rod: Any
+    reaches: Any
 
 
 class Rods(NamedTuple):
@@ -138,7 +107,7 @@ class Poses(NamedTuple):
 
 
 @compilable
-def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
+def drawn_at(plugin: Plugin, rods: Rods, sought: Sought, pressure: float) -> float:
     """Flow from the line [m³/s] at its pressure [Pa]; writes the rods' speeds, and
     inversely commands."""
     drawn = 0.0
@@ -147,28 +116,30 @@ def drawn_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
         c = plugin.coefficients[j]
         w = rods.work[j]
         supply = min(pressure, c.supply_pressure)
-        if law.inverse:
+        if sought.inverse:
             wished = rods.wished[j] * w.arm
-            rods.command[j] = least_command(c, w, wished, supply, law.quasi)
+            rods.command[j] = least_command(
+                c, w, wished, supply, sought.rod, sought.reaches
+            )
         w.open_area = steady_opening(rods.command[j], c)
-        rods.speed[j], flow = settled_rod(c, w, supply, law.quasi)
+        rods.speed[j], flow = sought.rod(c, w, supply)
         drawn += flow
     return drawn
 
 
 @compilable
-def taken_at(plugin: Plugin, rods: Rods, law: Law, pressure: float) -> float:
+def taken_at(plugin: Plugin, rods: Rods, sought: Sought, pressure: float) -> float:
     """Flow from the line [m³/s] at its pressure [Pa], what runs past the valves
     included; writes as `drawn_at`."""
     driven = plugin.order[plugin.idle :]
     pump = plugin.coefficients[plugin.order[plugin.order.size - 1]]
-    drawn = drawn_at(plugin, rods, law, pressure)
+    drawn = drawn_at(plugin, rods, sought, pressure)
     centre = centre_left(plugin.coefficients, driven, rods.work)
     return drawn + past_valves(pressure, centre, pump)[0]
 
 
 @compilable
-def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
+def shared_pressure(plugin: Plugin, rods: Rods, sought: Sought) -> float:
     """Pressure of the line [Pa] at which the pump gives what joints draw; inf where it
     has no limit.
 
@@ -180,7 +151,7 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
         return np.inf
     low = lowest(pump)
     high = pump.relief
-    over = taken_at(plugin, rods, law, high)
+    over = taken_at(plugin, rods, sought, high)
     if over <= 0.0:
         return high
     # where the pump gives this flow; at less pressure no more is taken
@@ -188,7 +159,7 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
         part = (over / pump.pump_flow) ** pump.pump_exponent
         low = max(low, high - pump.pump_droop * part)
     given = delivery(low, 1.0, pump)[0]
-    under = taken_at(plugin, rods, law, low) - given
+    under = taken_at(plugin, rods, sought, low) - given
     left = SETTLED * pump.pump_flow
     if under >= -left:
         return low
@@ -202,7 +173,7 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
         if count % 4 == 3:
             pressure = 0.5 * (low + high)
         given = delivery(pressure, 1.0, pump)[0]
-        excess = taken_at(plugin, rods, law, pressure) - given
+        excess = taken_at(plugin, rods, sought, pressure) - given
         if abs(excess) <= left:
             return pressure
         if excess > 0.0:
@@ -218,10 +189,8 @@ def shared_pressure(plugin: Plugin, rods: Rods, law: Law) -> float:
     return 0.5 * (low + high)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _settle(
-    plugin: Plugin, poses: Poses, law: Law, command, velocity, source: int = SOURCE
-) -> None:
+@compilable
+def _settle(plugin, poses, sought, command, velocity) -> None:
     """Replace velocities [rad/s], (S, J), by the settled ones; inversely commands by
     those that do it."""
     joints = plugin.order.size
@@ -235,27 +204,45 @@ def _settle(
             weigh(c, work[j], poses.angle[k, j], poses.load[k, j])
         wished[:] = velocity[k]
         rods = Rods(work, command[k], wished, speed)
-        pressure = shared_pressure(plugin, rods, law)
-        drawn_at(plugin, rods, law, pressure)
+        pressure = shared_pressure(plugin, rods, sought)
+        drawn_at(plugin, rods, sought, pressure)
         for a in range(plugin.idle, joints):
             j = plugin.order[a]
             c = plugin.coefficients[j]
             w = work[j]
-            if law.inverse and wished[j] != 0.0:
+            if sought.inverse and wished[j] != 0.0:
                 supply = min(pressure, c.supply_pressure)
                 command[k, j] = nearest_command(
-                    c, w, wished[j] * w.arm, command[k, j], supply, law.quasi
+                    c, w, wished[j] * w.arm, command[k, j], supply, sought.rod
                 )
                 w.open_area = steady_opening(command[k, j], c)
-                speed[j] = settled_rod(c, w, supply, law.quasi)[0]
+                speed[j] = sought.rod(c, w, supply)[0]
             velocity[k, j] = speed[j] / w.arm + 0.0  # no -0
 
 
+@cache
+def _compiled(rod: Any, reaches: Any) -> Any:
+    """Return `_settle` by a law."""
+
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def settle(
+        plugin,
+        poses,
+        inverse: bool,
+        command,
+        velocity,
+        source: int = source_key(rod, reaches, _settle),
+    ) -> None:
+        _settle(plugin, poses, Sought(inverse, rod, reaches), command, velocity)
+
+    return settle
+
+
 def settled_speeds(
-    plugin: Plugin, angle: Array, load: Array, command: Array, *, quasi_static: bool
+    plugin: Plugin, angle: Array, load: Array, command: Array, rung: Rung
 ) -> Array:
     """Return the settled velocities of J joints [rad/s] under commands [%], shape (S,
-    J).
+    J), on a rung that has settled speeds.
 
     Args:
         plugin: the actuators of one candidate.
@@ -263,19 +250,17 @@ def settled_speeds(
         load: torques that hold the joints against gravity and springs [N·m], shape (S,
             J).
         command: [%], shape (S, J).
-        quasi_static: whether the law is that of the quasi-static model.
 
     Of a joint that slides they are in m/s, and loads are forces [N]. One without
     actuator has 0.
     """
     velocity = np.zeros(angle.shape)
-    law = Law(False, quasi_static)
-    _settle(plugin, Poses(angle, load), law, command.copy(), velocity)
+    _call(rung, plugin, Poses(angle, load), False, command.copy(), velocity)
     return velocity
 
 
 def settled_commands(
-    plugin: Plugin, angle: Array, load: Array, velocity: Array, *, quasi_static: bool
+    plugin: Plugin, angle: Array, load: Array, velocity: Array, rung: Rung
 ) -> tuple[Array, Array]:
     """Return commands [%] at which joints have wished velocities [rad/s], (S, J), and
     those they then have.
@@ -285,5 +270,15 @@ def settled_commands(
     """
     command = np.zeros(angle.shape)
     reached = velocity.copy()
-    _settle(plugin, Poses(angle, load), Law(True, quasi_static), command, reached)
+    _call(rung, plugin, Poses(angle, load), True, command, reached)
     return command, reached
+
+
+def _call(rung: Rung, plugin: Plugin, *arguments: Any) -> None:
+    """Settle joints by the law of a rung."""
+    if not rung.has("pump_flow"):
+        endless = plugin.coefficients.copy()
+        endless["pump_flow"] = np.inf
+        plugin = plugin._replace(coefficients=endless)
+    law = LAWS[rung]
+    _compiled(law.rod, law.reaches)(plugin, *arguments)

@@ -1,5 +1,5 @@
-"""The speed at which a joint moves steadily through a pose: the law itself, without a
-simulated motion.
+"""The speed at which a joint of the dynamic model moves steadily through a pose: the
+law itself, without a simulated motion.
 
 The command is held, and all that starts, lags or rings has passed: the plungers rest,
 and the pump gives its full flow. Lever and load are those of the pose. The flow into a
@@ -16,8 +16,6 @@ Lever and load change on the way, and the oil yields to that: a chamber takes in
 more. With the steady pressures at both sides of the pose, ṗ = v dp/dx, which counts as
 a change of the area that oil has to fill. What is left out is of second order: the
 joint's acceleration on the way.
-
-In the quasi-static model the speed is that of `valve.rod_speed`.
 """
 
 # pyright: reportMissingParameterType=false
@@ -26,23 +24,13 @@ In the quasi-static model the speed is that of `valve.rod_speed`.
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from hydroid.arrays import Array
 from hydroid.hydraulics.cylinder import rod_way, weigh
 from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import open_share
-from hydroid.hydraulics.kernel import make_pad, source_key
 from hydroid.hydraulics.oil import volumes
-from hydroid.hydraulics.pump import (
-    centre_left,
-    delivery,
-    left_open,
-    line_pressure,
-    lowest,
-    past_valves,
-)
-from hydroid.hydraulics.records import LINEAR, Records, coefficients, has_force_curve
+from hydroid.hydraulics.pump import delivery, left_open, lowest, past_valves
+from hydroid.hydraulics.records import LINEAR
 from hydroid.hydraulics.seals import LEAST_LEVER, friction_damping, joint_friction
 from hydroid.hydraulics.solenoid import (
     beyond_dead_band,
@@ -50,9 +38,8 @@ from hydroid.hydraulics.solenoid import (
     resting_stroke,
     side_voltage,
 )
-from hydroid.hydraulics.valve import port_flow, rod_speed
+from hydroid.hydraulics.valve import port_flow
 
-SOURCE = source_key()
 # a rod's speeds between which the steady one is sought [m/s], or [rad/s]
 FIRST_SPEED = 1e-6
 MOST_SPEED = 1e3
@@ -250,7 +237,7 @@ def fed_speed(c, w, takes) -> Any:
 
 
 @compilable
-def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
+def areas_on_the_way(c, w, angle: float, load) -> Any:
     """Areas [m²] by which chambers A and B take in oil where their pressures change on
     the way.
 
@@ -258,7 +245,6 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
     (3,).
     """
     areas = (c.a.area, c.b.area)
-    w.open_area = steady_opening(command, c)
     weigh(c, w, angle - NEAR, load[0])
     speed, supply = fed_speed(c, w, areas)
     before_a, before_b, _ = oil_at(speed, supply, c, w, areas)
@@ -280,68 +266,32 @@ def areas_on_the_way(c, w, angle: float, load, command: float) -> Any:
 
 
 @compilable
-def _quasi_static_speed(coefficients, driven, pad) -> float:
-    """Speed [m/s] of the rod of a quasi-static joint, the only one of the `driven`."""
+def dynamic_rod(c, w, supply: float) -> Any:
+    """Speed of a rod [m/s] and the flow that it takes from the line [m³/s]."""
+    if w.open_area == 0.0 and c.leakage == 0.0:
+        return 0.0, 0.0
+    return balanced_speed(supply, c, w, (c.a.area, c.b.area))
+
+
+@compilable
+def is_pushed(rod, c, w, wished: float, supply: float) -> bool:
+    """Whether the oil still pushes at a wished speed [m/s], so that the rod is at least
+    as fast: as `Law.reaches` has it, without the search for the speed."""
+    sign = 1.0 if wished > 0.0 else -1.0
+    left = surplus(wished, supply, c, w, (c.a.area, c.b.area))[0]
+    return sign * left >= joint_friction(c, w.arm)
+
+
+@compilable
+def lone_dynamic(coefficients, pad, angle: float, loads) -> float:
+    """Velocity [rad/s] of the only joint on the pump, as `Law.lone` has it."""
     c = coefficients[0]
     w = pad.joints[0]
-    line = pad.line[0]
-    supply = c.supply_pressure
-    if c.pump_flow < np.inf:
-        # where the search for the line's pressure begins
-        line.pressure = c.relief
-        line.centre = centre_left(coefficients, driven, pad.joints)
-        shared = line_pressure(coefficients, driven, pad.joints, line, 1.0)
-        supply = min(supply, shared)
-    speed = rod_speed(c, w, supply)[0]
-    return speed if w.open_area > 0.0 else -speed
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _steady(
-    coefficients, angle, load, commands, quasi: bool, source: int = SOURCE
-) -> Array:
-    """Return the velocities [rad/s] of n candidates' joint under m commands [%], (n, m);
-    loads are (n, 3), COEFFICIENTS (n,)."""
-    pad = make_pad(1)
-    w = pad.joints[0]
-    driven = np.zeros(1, np.intp)
-    velocity = np.empty((coefficients.size, commands.size))
-    for i in range(coefficients.size):
-        c = coefficients[i]
-        for k in range(commands.size):
-            w.open_area = steady_opening(commands[k], c)
-            shut = w.open_area == 0.0 and c.leakage == 0.0
-            takes = (c.a.area, c.b.area)
-            if not (quasi or shut):
-                takes = areas_on_the_way(c, w, angle, load[i], commands[k])
-            weigh(c, w, angle, load[i, 1])
-            speed = 0.0
-            if quasi:
-                speed = _quasi_static_speed(coefficients[i : i + 1], driven, pad)
-            elif not shut:
-                speed = fed_speed(c, w, takes)[0]
-            velocity[i, k] = speed / w.arm
-    return velocity
-
-
-def steady_velocity(
-    joint: Records, angle: float, load: Array, commands: Array, *, quasi_static: bool
-) -> Array:
-    """Return the velocities [rad/s] at which a joint turns steadily under m commands
-    [%], shape (n, m).
-
-    Args:
-        joint: n candidates' values, of JOINT, shape (n,).
-        angle: of the pose [rad].
-        load: torques that hold the joint against gravity and springs, at the angle -
-            NEAR, at the angle, and at the angle + NEAR [N·m], shape (n, 3).
-        quasi_static: whether the law is that of the quasi-static model.
-
-    Of a joint that slides they are in m/s, and loads are forces [N]. NaN where no
-    force-stroke curve exists.
-    """
-    alone: Records = joint[:, None]  # pyright: ignore[reportAssignmentType]
-    table = coefficients(alone)[:, 0].view(np.ndarray)
-    velocity: Array = _steady(table, angle, load, commands, quasi_static)
-    velocity[~has_force_curve(alone)] = np.nan
-    return velocity
+    shut = w.open_area == 0.0 and c.leakage == 0.0
+    takes = (c.a.area, c.b.area)
+    if not shut:
+        takes = areas_on_the_way(c, w, angle, loads)
+    weigh(c, w, angle, loads[1])
+    if shut:
+        return 0.0 / w.arm
+    return fed_speed(c, w, takes)[0] / w.arm

@@ -259,11 +259,15 @@ def _put_oil(oil: "_Oil", joint: int, first: int, rates: Array, speeds: Array) -
 
 
 def _side(plant: Plant, joint: int, command: Array) -> dict[str, float]:
-    """Return the quantities of the side that a joint (0-based) is driven towards."""
+    """Return the quantities of the side that a joint (0-based) is driven towards; 0
+    where the model has none."""
     actuator = plant.actuators[joint]
     end = "a" if command[joint] > 0.0 else "b"
     keys = ("delay", "pilot_lag", "plunger_damping", "dead_band", "onset")
-    return {key: float(actuator[f"{key}_{end}"]) for key in keys}
+    return {
+        key: float(actuator[f"{key}_{end}"]) if plant.rung.has(key) else 0.0
+        for key in keys
+    }
 
 
 def _slopes(plant: Plant, command: Array, columns: Index) -> tuple[Array, Array, Array]:
@@ -316,18 +320,20 @@ def _valve(plant: Plant, joint: int, command: Array) -> _Valve:
         source = len(states)
         states.append("pilot stage")
 
-    # the plunger's acceleration first: its stroke is what goes on
-    speed = len(states)
-    stroke = speed + 1
-    states += ["plunger speed", "plunger"]
-    stiffness = _plunger_stiffness(plant, joint, side, float(command[joint]))
-    mass = float(actuator["plunger_mass"])
-    rates[stroke, speed] = 1.0
-    rates[speed, speed] = -side["plunger_damping"] / mass
-    rates[speed, stroke] = -stiffness / mass
-    rates[speed, source] = stiffness / mass
-    if actuator["opening_lag"] > SHORT:
-        _put_lag(rates, len(states), stroke, actuator["opening_lag"])
+    if plant.rung.has("plunger_mass"):
+        # the plunger's acceleration first: its stroke is what goes on
+        speed = len(states)
+        stroke = speed + 1
+        states += ["plunger speed", "plunger"]
+        stiffness = _plunger_stiffness(plant, joint, side, float(command[joint]))
+        mass = float(actuator["plunger_mass"])
+        rates[stroke, speed] = 1.0
+        rates[speed, speed] = -side["plunger_damping"] / mass
+        rates[speed, stroke] = -stiffness / mass
+        rates[speed, source] = stiffness / mass
+        source = stroke
+    if plant.rung.has("opening_lag") and actuator["opening_lag"] > SHORT:
+        _put_lag(rates, len(states), source, actuator["opening_lag"])
         states.append("opening")
     size = len(states)
     return _Valve(tuple(states), rates[:size, :size], rates[:size, COMMAND])
@@ -369,7 +375,8 @@ class _Oil(NamedTuple):
 
 def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
     """Return how a joint (0-based) rings on its oil; None where it has none."""
-    if not plant.rung.at_once:
+    rung = plant.rung
+    if rung.has("bulk_modulus"):
         stiffness = _oil_stiffness(plant, joint)
         inertia = _inertia(plant, joint)
         yielding = _yielding(plant, joint, command)
@@ -377,7 +384,7 @@ def _oil(plant: Plant, joint: int, command: Array) -> _Oil | None:
         damping = 0.5 * yielding * float(np.sqrt(stiffness * inertia))
         return _Oil(frequency, damping)
     actuator = plant.actuators[joint]
-    if np.isinf(actuator["oil_frequency"]):
+    if not rung.has("oil_frequency") or np.isinf(actuator["oil_frequency"]):
         return None
     frequency = 2.0 * np.pi * float(actuator["oil_frequency"])
     damping = float(actuator["oil_damping"])
@@ -410,7 +417,7 @@ def _yielding(plant: Plant, joint: int, command: Array) -> float:
     loads = np.repeat(load, 2, axis=0)
     loads[:, column] += [change, -change]
     commands = np.repeat(command[None, columns], 2, axis=0)
-    speeds = settled_speeds(steady.plugin, poses, loads, commands, quasi_static=False)
+    speeds = settled_speeds(steady.plugin, poses, loads, commands, steady.rung)
     return float(speeds[1, column] - speeds[0, column]) / (2.0 * change)
 
 

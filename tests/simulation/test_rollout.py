@@ -3,6 +3,7 @@ cache."""
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -12,15 +13,8 @@ import pytest
 
 from hydroid.hydraulics import kernel
 from hydroid.plant import batch
-from hydroid.settings import linkage
-from hydroid.simulation import (
-    gravity,
-    openings,
-    quasi_static,
-    rollout,
-    settled,
-    steady,
-)
+from hydroid.simulation import lone, openings, rollout, settled
+from hydroid.simulation.laws import LAWS
 from hydroid.simulation.rollout import SteppedArm
 
 ARM = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
@@ -70,38 +64,64 @@ def inlined(function: FunctionType, seen: set[FunctionType]) -> Iterator[Path]:
         used = getattr(used, "py_func", used)
         if isinstance(used, FunctionType) and used.__module__.startswith("hydroid"):
             yield from inlined(used, seen)
+    for cell in function.__closure__ or ():
+        yield from inlined(cell.cell_contents, seen)
 
 
-@pytest.mark.parametrize(
-    ("compiled", "more"),
-    [
-        (rollout.roll, []),
-        (quasi_static.roll_quasi_static, [rollout.write_sample, gravity.hold]),
-        (openings._push, []),  # pyright: ignore[reportPrivateUsage]
-        (openings._open, []),  # pyright: ignore[reportPrivateUsage]
-        (steady._steady, []),  # pyright: ignore[reportPrivateUsage]
-        (
-            batch._roll_some,  # pyright: ignore[reportPrivateUsage]
-            [rollout.write_sample, quasi_static.share_pump, gravity.hold],
-        ),
-        (settled._settle, [steady.balanced_speed]),  # pyright: ignore[reportPrivateUsage]
-    ],
-)
+def fixed(compiled: Any) -> Any:
+    """Return a function whose key is the kernel's, which is made again."""
+    assert kernel.source_key() in compiled.py_func.__defaults__
+    return compiled
+
+
+MADE = {
+    "push": lambda: fixed(openings._push),  # pyright: ignore[reportPrivateUsage]
+    "open": lambda: fixed(openings._open),  # pyright: ignore[reportPrivateUsage]
+}
+"""what makes each compiled function, by name; not from a cache, so that its key is made
+anew"""
+for rung, law in LAWS.items():
+    MADE[f"rollout of {rung.name}"] = partial(rollout.compiled.__wrapped__, law.roll)
+    of_batch = batch._compiled.__wrapped__  # pyright: ignore[reportPrivateUsage]
+    MADE[f"batch of {rung.name}"] = partial(of_batch, law.roll)
+    if law.rod is not None:
+        settle = settled._compiled.__wrapped__  # pyright: ignore[reportPrivateUsage]
+        MADE[f"settled {rung.name}"] = partial(settle, law.rod, law.reaches)
+    if law.lone is not None:
+        of_one = lone._compiled.__wrapped__  # pyright: ignore[reportPrivateUsage]
+        MADE[f"lone {rung.name}"] = partial(of_one, law.lone)
+
+
+@pytest.mark.parametrize("make", MADE.values(), ids=MADE)
 def test_numbas_cache_is_keyed_by_every_file_that_a_function_takes_code_in_from(
-    compiled, more
+    make, monkeypatch: pytest.MonkeyPatch
 ):
-    function = compiled.py_func
-    own = Path(function.__code__.co_filename)
-    keyed = {*Path(kernel.__file__).parent.glob("*.py"), Path(linkage.__file__), own}
-    keyed |= {Path(other.__code__.co_filename) for other in more}
-    assert set(inlined(function, set())) <= keyed
-    assert kernel.source_key(*more) in function.__defaults__
+    keyed = set[Path]()
+    read = Path.read_bytes
+
+    def watched(file: Path) -> bytes:
+        keyed.add(file)
+        return read(file)
+
+    monkeypatch.setattr(Path, "read_bytes", watched)
+    function = make().py_func
+    own = Path(function.__code__.co_filename)  # numba itself looks at this one
+    assert len(keyed) > 10
+    assert set(inlined(function, set())) <= keyed | {own}
+
+
+def test_a_law_that_calls_through_a_module_is_refused():
+    def rod(c, w, supply):
+        return kernel.eliminate(c, w, supply)
+
+    with pytest.raises(TypeError, match="rod: import what it uses of kernel"):
+        kernel.source_key(rod)
 
 
 def test_the_key_changes_with_a_files_text(tmp_path: Path):
     file = tmp_path / "one.py"
     keys = set[int]()
-    function = FunctionType(compile("", str(file), "exec"), {})
+    function = FunctionType(compile("", str(file), "exec"), {"__name__": "one"})
     for text in ("a = 1\n", "a = 2\n"):
         file.write_text(text)
         keys.add(kernel.source_key(function))

@@ -8,8 +8,9 @@ from conftest import candidates
 from hydroid.hydraulics.actuator import make_plugin, swallowed
 from hydroid.hydraulics.pump import delivery
 from hydroid.hydraulics.records import coefficients
+from hydroid.rungs import DYNAMIC, QUASI_STATIC
+from hydroid.simulation.lone import steady_velocity
 from hydroid.simulation.settled import settled_commands, settled_speeds
-from hydroid.simulation.steady import steady_velocity
 
 JOINTS = [1, 2, 3]
 """two cylinders and a rotary actuator, 0-based"""
@@ -40,7 +41,7 @@ LAWS = [
     STRAIGHT | SLOPING | {"pump_bypass": 0.7},
 ]
 both_models = pytest.mark.parametrize(
-    "quasi_static", [False, True], ids=["dynamic", "quasi-static"]
+    "rung", [DYNAMIC, QUASI_STATIC], ids=lambda rung: rung.name
 )
 
 
@@ -67,28 +68,26 @@ def poses(arm):
 @both_models
 @pytest.mark.parametrize("values", LAWS)
 def test_commands_for_the_speeds_of_commands_are_these_commands(
-    arm, poses, values, quasi_static
+    arm, poses, values, rung
 ):
     plugin, _ = actuators(arm, **values)
     angle, load = poses
     command = np.random.default_rng(1).uniform(30.0, 90.0, angle.shape)
     command *= np.where(np.arange(60).reshape(20, 3) % 2, -1.0, 1.0)
-    speed = settled_speeds(plugin, angle, load, command, quasi_static=quasi_static)
+    speed = settled_speeds(plugin, angle, load, command, rung)
     assert np.abs(speed).min() > 0.0
-    found, reached = settled_commands(
-        plugin, angle, load, speed, quasi_static=quasi_static
-    )
+    found, reached = settled_commands(plugin, angle, load, speed, rung)
     np.testing.assert_allclose(reached, speed, rtol=1e-5)
     np.testing.assert_allclose(found, command, rtol=1e-4)
 
 
 @both_models
 @pytest.mark.parametrize("values", LAWS[:1] + LAWS[2:4])
-def test_without_a_pump_each_joint_is_alone(arm, poses, values, quasi_static):
+def test_without_a_pump_each_joint_is_alone(arm, poses, values, rung):
     plugin, joints = actuators(arm, **values)
     angle, load = poses
     command = np.tile([60.0, -45.0, 80.0], (20, 1))
-    speed = settled_speeds(plugin, angle, load, command, quasi_static=quasi_static)
+    speed = settled_speeds(plugin, angle, load, command, rung)
     for k, j in np.ndindex(3, 3):
         loads = np.full((1, 3), load[k, j])
         alone = steady_velocity(
@@ -96,26 +95,24 @@ def test_without_a_pump_each_joint_is_alone(arm, poses, values, quasi_static):
             angle[k, j],
             loads,
             command[k, j : j + 1],
-            quasi_static=quasi_static,
+            rung,
         )
         assert speed[k, j] == pytest.approx(alone[0, 0], rel=1e-6)
 
 
 @both_models
-def test_the_pump_gives_what_joints_draw(arm, poses, quasi_static):
+def test_the_pump_gives_what_joints_draw(arm, poses, rung):
     """Oil is conserved: at the line's pressure, which the flows imply, both are
     equal."""
     plugin, joints = actuators(arm, **STRAIGHT | PUMP | {"draw_b": 0.7})
     angle, load = poses
     command = np.tile([90.0, -80.0, 100.0], (20, 1))
-    speed = settled_speeds(plugin, angle, load, command, quasi_static=quasi_static)
+    speed = settled_speeds(plugin, angle, load, command, rung)
     table = coefficients(joints)[0]
     drawn = np.array(
         [swallowed(table, one, v).sum() for one, v in zip(angle, speed, strict=True)]
     )
-    free = settled_speeds(
-        actuators(arm, **STRAIGHT)[0], angle, load, command, quasi_static=quasi_static
-    )
+    free = settled_speeds(actuators(arm, **STRAIGHT)[0], angle, load, command, rung)
     wanted = np.array(
         [swallowed(table, one, v).sum() for one, v in zip(angle, free, strict=True)]
     )
@@ -127,46 +124,34 @@ def test_the_pump_gives_what_joints_draw(arm, poses, quasi_static):
 
 
 @both_models
-def test_what_cannot_be_had_is_met_by_the_nearest(arm, poses, quasi_static):
+def test_what_cannot_be_had_is_met_by_the_nearest(arm, poses, rung):
     plugin, _ = actuators(arm, **STRAIGHT)
     angle, load = poses
     for sign in (1.0, -1.0):
         wish = np.full(angle.shape, sign * 50.0)
-        command, reached = settled_commands(
-            plugin, angle, load, wish, quasi_static=quasi_static
-        )
-        full = settled_speeds(
-            plugin, angle, load, np.full(angle.shape, 100.0), quasi_static=quasi_static
-        )
-        other = settled_speeds(
-            plugin, angle, load, np.full(angle.shape, -100.0), quasi_static=quasi_static
-        )
+        command, reached = settled_commands(plugin, angle, load, wish, rung)
+        full = settled_speeds(plugin, angle, load, np.full(angle.shape, 100.0), rung)
+        other = settled_speeds(plugin, angle, load, np.full(angle.shape, -100.0), rung)
         assert (np.abs(command) == 100.0).all()
         fastest = np.maximum(full, other) if sign > 0 else np.minimum(full, other)
         np.testing.assert_allclose(reached, fastest, rtol=1e-9)
 
 
 @both_models
-def test_a_valve_that_opens_with_a_jump_has_a_slowest_speed(arm, poses, quasi_static):
+def test_a_valve_that_opens_with_a_jump_has_a_slowest_speed(arm, poses, rung):
     """Below half of it the nearest is to stand, above it is that speed."""
     plugin, _ = actuators(arm, **STRAIGHT | {"onset_a": 4.0, "onset_b": 4.0})
     angle, load = poses
-    least = settled_speeds(
-        plugin, angle, load, np.full(angle.shape, 1e-6), quasi_static=quasi_static
-    )
+    least = settled_speeds(plugin, angle, load, np.full(angle.shape, 1e-6), rung)
     assert np.abs(least).min() > 1e-4
     for part, wanted in ((0.4, 0.0), (0.6, 1.0)):
-        _, reached = settled_commands(
-            plugin, angle, load, part * least, quasi_static=quasi_static
-        )
+        _, reached = settled_commands(plugin, angle, load, part * least, rung)
         np.testing.assert_allclose(reached, wanted * least, rtol=1e-4)
 
 
 @both_models
-def test_no_wish_needs_no_command(arm, poses, quasi_static):
+def test_no_wish_needs_no_command(arm, poses, rung):
     plugin, _ = actuators(arm, **STRAIGHT | PUMP)
-    command, reached = settled_commands(
-        plugin, *poses, np.zeros((20, 3)), quasi_static=quasi_static
-    )
+    command, reached = settled_commands(plugin, *poses, np.zeros((20, 3)), rung)
     assert not command.any()
     assert not reached.any()

@@ -6,12 +6,13 @@ import pytest
 from conftest import candidates
 from made_logs import at_rest
 
-from hydroid.rungs import RUNGS
+from hydroid.rungs import DYNAMIC, QUASI_STATIC, RUNGS
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation import Simulation
+from hydroid.simulation.lone import steady_velocity
 from hydroid.simulation.rollout import SteppedArm
 from hydroid.simulation.scenario import Scenario
-from hydroid.simulation.steady import NEAR, steady_velocity
+from hydroid.simulation.steady import NEAR
 
 SHOULDER, ROLL = 1, 3
 """a cylinder that lifts the arm, and a rotary actuator, 0-based"""
@@ -42,8 +43,7 @@ def both(spec, arm):
         poses = angle[-2] + NEAR * np.array([[-1.0], [0.0], [1.0]])
         load = np.array([[stepped.start(values, [0], near)[0] for near in poses]])
         args = one.joints[:, joint], float(angle[-2]), load, np.array([command])
-        at_once = RUNGS[model].at_once
-        return settled, float(steady_velocity(*args, quasi_static=at_once)[0, 0])
+        return settled, float(steady_velocity(*args, RUNGS[model])[0, 0])
 
     return compare
 
@@ -110,16 +110,14 @@ def shoulder(arm):
     """Steady velocities [rad/s] of the shoulder in a pose, (n, m), under loads [N·m],
     (n,)."""
 
-    def velocity(load, commands, quasi_static=False, **values):
+    def velocity(load, commands, rung=DYNAMIC, **values):
         one = candidates(arm, len(load))
         one.joints.stiffness[:] = 0.0
         for name, value in values.items():
             one.joints[name][:] = value
         loads = np.repeat(np.array(load)[:, None], 3, axis=1)  # the same on the way
-        how = {"quasi_static": quasi_static}
-        return steady_velocity(
-            one.joints[:, SHOULDER], 0.2, loads, np.array(commands), **how
-        )
+        joint = one.joints[:, SHOULDER]
+        return steady_velocity(joint, 0.2, loads, np.array(commands), rung)
 
     return velocity
 
@@ -138,7 +136,7 @@ def test_without_leakage_the_models_have_one_law(shoulder, pump):
         [-100.0, -40.0, -5.0, 5.0, 40.0, 100.0],
     )
     dynamic, quasi = (
-        shoulder(load, commands, quasi_static=q, **values) for q in (False, True)
+        shoulder(load, commands, rung, **values) for rung in (DYNAMIC, QUASI_STATIC)
     )
     np.testing.assert_allclose(dynamic, quasi, rtol=1e-4, atol=1e-9)
 

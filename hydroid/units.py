@@ -84,6 +84,17 @@ UNITS = _units()
 """by their spelling in lower case"""
 
 
+NO_UNIT = Unit("", "", 1.0)
+"""of a number that has none"""
+
+
+def units_of(quantity: str) -> tuple[str, ...]:
+    """Return the units of what is measured by their usual spellings, in the order of
+    `units.yaml`."""
+    names = [unit.name for unit in UNITS.values() if unit.quantity == quantity]
+    return tuple(dict.fromkeys(names))
+
+
 def unit_of(text: str) -> Unit | None:
     """Return the unit that a text spells, with or without brackets around it;
     None where it spells none."""
@@ -106,10 +117,14 @@ def bare(text: str) -> str:
     return text.strip().strip("[]()<>").strip()
 
 
+def is_usual_step(seconds: float) -> bool:
+    """Return whether a step between samples is one of 2 to 1000 samples a second."""
+    return 9e-4 < seconds < 0.6
+
+
 def likely_time_unit(step: float) -> str:
-    """Return the unit in which a step between samples is one of 2 to 1000 samples a
-    second; "": in none."""
+    """Return the unit in which a step between samples is a usual one; "": in none."""
     for name in ("s", "ms", "us", "ns", "min", "day"):
-        if 9e-4 < step * UNITS[name].factor < 0.6:
+        if is_usual_step(step * UNITS[name].factor):
             return name
     return ""

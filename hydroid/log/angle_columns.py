@@ -9,18 +9,15 @@ from hydroid.arrays import Limits
 from hydroid.files import Plain
 from hydroid.log.columns import Column, Entry
 from hydroid.log.joint_columns import Assignment, Joints
+from hydroid.log.likely_units import LARGEST_ANGLE, LARGEST_METRES
 from hydroid.log.mapping import angle_margin
 from hydroid.log.rods import Rod
 from hydroid.log.uncalibrated import over_the_joint, over_the_range
 from hydroid.settings.log import LENGTHS
 from hydroid.units import UNITS
 
-LARGEST_ANGLE = np.radians(400.0)
-"""of an arm's joint [rad]; larger numbers are lengths or counts"""
 LARGEST_RADIANS = 6.3
 """of a log's angles without a unit; larger numbers are degrees"""
-LARGEST_METRES = 50.0
-"""of a position without a unit, for no telescope is longer; larger numbers are mm"""
 COUNTS = "counts"
 """in place of a unit of angles, where columns without one hold what a sensor gives"""
 
@@ -79,7 +76,8 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
     if not unit:
         unit = usual_unit if usual_unit != COUNTS else "deg"
         hint = "its unit is stated nowhere"
-    return Entry(_scaled(column, unit), f"{column.name}: angle in {unit}", hint)
+    settings: Plain = {"column": column.name, "unit": unit}
+    return Entry(settings, f"{column.name}: angle in {unit}", hint)
 
 
 def _can_only_be_counts(
@@ -112,22 +110,16 @@ def _looks_like_counts(
     return limits is not None or column.is_of_a_sensor
 
 
-def _scaled(column: Column, unit: str) -> Plain:
-    """Return the settings of a column whose cells, times its scale, are in a unit."""
-    settings: Plain = {"column": column.name, "unit": unit}
-    if column.scale != 1:
-        settings["scale"] = column.scale
-    return settings
-
-
 def _position(column: Column) -> Entry:
     """Return the settings of the column of a joint that slides."""
     unit = column.unit or _usual_length(column)
-    return Entry(_scaled(column, unit), f"{column.name}: position in {unit}")
+    settings: Plain = {"column": column.name, "unit": unit}
+    return Entry(settings, f"{column.name}: position in {unit}")
 
 
 def _usual_length(column: Column) -> str:
-    """Return the unit of positions that state none, by their size."""
+    """Return the unit of positions that state none, by their size: mm where no
+    telescope is as many m long."""
     largest = float(np.nanmax(np.abs(column.values)))
     return "mm" if largest > LARGEST_METRES else "m"
 
@@ -187,7 +179,7 @@ def _cylinder_length(column: Column, rod: Rod, angle_unit: str) -> Entry | None:
         # lengths that its cylinder cannot have: who reads them says which
         reading = (column.unit or rod.nearest_unit(column.values), 0.0)
     unit, offset = reading
-    settings = _scaled(column, unit)
+    settings: Plain = {"column": column.name, "unit": unit}
     # without an offset the sensor measures from pin to pin
     if not offset:
         return Entry(settings, f"{column.name}: length of the cylinder in {unit}")

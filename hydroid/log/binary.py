@@ -6,7 +6,7 @@ Of a .mat a vector is a column of the variable's name; column k of a matrix is
 dot; element k of a cell array is `name[k]`.
 """
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -206,15 +206,15 @@ def first_bytes(path: Path) -> bytes:
         return file.read(520)  # MATLAB's HDF5 begins at 512
 
 
+TableReader = Callable[[Path, LogSettings, Progress], Table]
 HDF5 = b"\x89HDF\r\n\x1a\n"
-BINARY = {
+BINARY: dict[str, tuple[TableReader, tuple[bytes, ...]]] = {
     "Parquet": (open_parquet, (b"PAR1",)),
     "ROS bag": (open_bag, (b"#ROSBAG V", b"SQLite format 3")),
     "MCAP": (open_bag, (b"\x89MCAP0",)),
     ".mat": (open_mat, (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file", HDF5)),
 }
 """by a format's name: what reads a file with the log's settings, and how such files
-begin; a name that is an ending marks a file as well, and comes last: the bytes count
-first"""
+begin; a name that is an ending marks a file that begins as none does"""
 FORMATS = listed(["CSV", *BINARY])
 """all formats that are read, for `--help` and messages"""

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from hydroid.arrays import Array, Ints
-from hydroid.log.clues import CLUES, column_unit
+from hydroid.log.clues import CLUES, RAW, column_unit
 from hydroid.log.conditions import is_condition
+from hydroid.log.likely_units import is_within, likely_unit
 from hydroid.log.log import LogFinding
 from hydroid.log.repair import FINER, GAP, SHORTEST, sample_period
 from hydroid.log.sensors import check_sensors
@@ -18,9 +19,8 @@ from hydroid.log.signals import (
 )
 from hydroid.log.table import Recording, Signal
 from hydroid.settings.log import LogSettings
-from hydroid.units import UNITS, Unit, likely_time_unit
+from hydroid.units import UNITS, Unit, is_usual_step, likely_time_unit
 
-DEGREE = UNITS["deg"].factor
 MANY = 0.05
 """part of the values other than 0 from which those outside their limits are no strays,
 but have a common reason"""
@@ -119,11 +119,15 @@ def _time_remedy(recording: Recording, period: float, duration: float) -> str:
     if in_unit == 1 or duration * in_unit < SHORTEST:
         return "take more samples, or check log.time.unit and log.period_s"
     hint = f"if its unit is {unit}, set log.time.unit: {unit}"
-    given = recording.table.units.get(signal.name, "")
-    stated = column_unit(signal.name, given)
+    stated = _stated_unit(recording, signal)
     if stated is not None and stated.factor == signal.gain:
         return f"take more samples, or {hint}"
     return hint
+
+
+def _stated_unit(recording: Recording, signal: Signal) -> Unit | None:
+    """Return the unit that the file states for a column; None: it states none."""
+    return column_unit(signal.name, recording.table.units.get(signal.name, ""))
 
 
 def _values(recording: Recording) -> Iterator[LogFinding]:
@@ -143,7 +147,7 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
         kind = "outside"
         remedy = dict[str, str]()
         if len(rows) > MANY * (values != 0).sum():
-            kind, remedy = _explained(signal, values, likely)
+            kind, remedy = _explained(recording, signal, values, likely)
         if is_condition(signal):
             kind = "condition outside"
         factor = UNITS[signal.unit.lower()].factor
@@ -164,7 +168,7 @@ def _values(recording: Recording) -> Iterator[LogFinding]:
 
 
 def _explained(
-    signal: Signal, values: Array, likely: CommandRange | None
+    recording: Recording, signal: Signal, values: Array, likely: CommandRange | None
 ) -> tuple[str, dict[str, str]]:
     """Return the kind of fault that values outside their limits are, and what mends it;
     commands are `likely` in a range."""
@@ -176,49 +180,31 @@ def _explained(
             likely = around.with_overshoot(values)._replace(name=name)
         remedy = likely.remedy(signal.setting, signal.gain, signal.offset)
         return "outside in another range", remedy
-    if signal.unit == "deg":
-        return _explained_angle(signal, values)
+    if signal.kind != "angle":
+        return "outside", {}
+    other = likely_unit(signal, values, _stated_unit(recording, signal))
+    if other is not None:
+        return "outside in another unit", {
+            "word": f"{signal.shown.word}s",
+            "other": other.name,
+        }
+    if is_within(signal, 2 * signal.offset - values):
+        return "outside, turned", {"scale": f"{-signal.scale:g}"}
     return "outside", {}
-
-
-def _explained_angle(signal: Signal, values: Array) -> tuple[str, dict[str, str]]:
-    """Return the fault of angles [rad] outside their limits: unit, sign, or neither."""
-    # a degree is 0.017 rad, which hardly any scale makes up for
-    is_in_degrees = abs(signal.gain) < 0.1
-    if is_in_degrees:
-        other = "rad"
-        in_other = values / DEGREE
-        scale = -signal.gain / DEGREE
-    else:
-        other = "deg"
-        in_other = values * DEGREE
-        scale = -signal.gain
-    # degrees read as radians turn far more
-    may_be_other = is_in_degrees or np.nanmax(np.abs(values)) > np.pi
-    if may_be_other and _is_within(signal, in_other):
-        return "outside in another unit", {"other": other}
-    if _is_within(signal, 2 * signal.offset - values):
-        return "outside, turned", {"scale": f"{scale:g}"}
-    return "outside", {}
-
-
-def _is_within(signal: Signal, values: Array) -> bool:
-    low = np.nanmin(values)
-    high = np.nanmax(values)
-    return bool(low >= signal.low and high <= signal.high)
 
 
 def _units(recording: Recording) -> Iterator[LogFinding]:
     """Yield units that the file states and the settings contradict."""
     period = sample_period(recording.time)
     for signal in recording.signals:
-        given = recording.table.units.get(signal.name, "")
-        unit = column_unit(signal.name, given)
-        if unit is None or CLUES["units"].get(unit.quantity) != signal.kind:
+        unit = _stated_unit(recording, signal)
+        if unit is None:
             continue
-        if _contradicts(unit, signal, period):
+        # a pressure is called as what its unit measures
+        kind = CLUES["units"].get(unit.quantity, unit.quantity)
+        if kind == signal.kind and _contradicts(unit, signal, period):
             remedy = f"unit: {unit.name}"
-            if signal.kind == "command":
+            if unit.quantity in RAW:
                 remedy = "scale (command [%] = scale · cell + offset)"
             setting = signal.setting or f"log.{signal.kind}"
             names = {"setting": setting, "unit": unit.name, "remedy": remedy}
@@ -230,12 +216,9 @@ def _contradicts(unit: Unit, signal: Signal, period: float) -> bool:
 
     The unit of a time counts only where the period [s] is plausible in it.
     """
-    gain = abs(signal.gain)
-    if signal.kind == "command":
-        return unit.name != "%" and gain == 1
-    if unit.factor == gain:
+    if unit.quantity not in RAW and unit.factor == abs(signal.gain):
         return False
     if signal.kind == "time":
-        return unit.name == likely_time_unit(period / gain)
+        return is_usual_step(period / signal.gain * unit.factor)
     # another scale may hold the unit
-    return gain in (1, DEGREE)
+    return abs(signal.scale) == 1

@@ -18,24 +18,20 @@ from hydroid.units import UNITS, Unit, likely_time_unit, unit_of
 NO_SETTINGS: Plain = {}
 EXCEL_DAYS = 30_000
 """days from 1900 that a spreadsheet's dates are, at least"""
-KEPT_IN = {"length": "mm", "angle": "deg"}
-"""units of the settings that others, such as inches, are brought to"""
 
 
 class Column(NamedTuple):
     """A column that seems to be a signal.
 
     Its `kind` is time, command, angle or target; the `unit` is empty where the file
-    does not state one; `values` are its cells, shape (R,), times `scale`, which is 1
-    but for units that settings do not have; `further` are those of the same column in
-    other logs.
+    does not state one; `values` are its cells, shape (R,); `further` are those of the
+    same column in other logs.
     """
 
     name: str
     kind: str
     unit: str
     values: Array
-    scale: float = 1.0
     further: tuple[Array, ...] = ()
 
     @property
@@ -123,8 +119,7 @@ def beside(columns: Sequence[Column], tables: Sequence[Table]) -> list[Column]:
         further = list[Array]()
         for table in tables:
             with suppress(LogError, KeyError):
-                values = table.read([Signal(column.name, column.kind)]).time
-                further.append(column.scale * values)
+                further.append(table.read([Signal(column.name, column.kind)]).time)
         wider.append(column._replace(further=tuple(further)))
     return wider
 
@@ -188,20 +183,11 @@ def _read_column(
     if not np.isfinite(values).any():
         return None
     stated = unit.name if unit else ""
-    if unit and kind == "angle" and _is_foreign(unit):
-        stated = KEPT_IN[unit.quantity]
-        scale = float(f"{unit.factor / UNITS[stated].factor:.9g}")
-        return Column(name, kind, stated, scale * values, scale)
     if kind == "time" and not rises(values):
         kind = _kind_in_seconds(name, values, stated, names)
         if kind == "angle":
             stated = ""
     return Column(name, kind, stated, values)
-
-
-def _is_foreign(unit: Unit) -> bool:
-    """Return whether settings have no such unit of angles or lengths."""
-    return unit.quantity in KEPT_IN and unit.name not in (*LENGTHS, *ANGLES)
 
 
 def _kind_in_seconds(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hydroid.arrays import Array
+from hydroid.arrays import Array, Limits
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.clues import CLUES, column_unit, joint_of, number_in, words
@@ -45,12 +45,9 @@ def guess_conditions(
     `joints`: their names, and those of what they move; a column that names one is its
     own speed.
     """
-    table = tables[0]
-    spare = [name for name in table.names if name and name not in used]
-    free = [name for name in spare if joint_of(name, joints) is None]
-    units = {name: column_unit(name, table.units.get(name, "")) for name in free}
-    engines = [name for name in free if _is_engine(name, units[name])]
-    oils = [name for name in free if _is_oil(name, units[name])]
+    units = _spare_columns(tables[0], joints, used)
+    engines = [name for name, unit in units.items() if _is_engine(name, unit)]
+    oils = [name for name, unit in units.items() if _is_oil(name, unit)]
     # of several the one whose name says most
     of_names: tuple[tuple[Input, str], ...] = (
         ("engine_speed", _best(engines, "engine")),
@@ -60,6 +57,20 @@ def guess_conditions(
         if column:
             unit = units[column]
             yield condition_guess(tables, column, quantity, unit.name if unit else "")
+
+
+def _spare_columns(
+    table: Table, joints: Sequence[str], used: Collection[str]
+) -> dict[str, Unit | None]:
+    """Return the units of the columns that are neither `used` nor a joint's, by name;
+    None of one that states none."""
+    units = dict[str, Unit | None]()
+    for name in table.names:
+        if not name or name in used:
+            continue
+        if joint_of(name, joints) is None:
+            units[name] = column_unit(name, table.units.get(name, ""))
+    return units
 
 
 def _is_engine(name: str, unit: Unit | None) -> bool:
@@ -103,31 +114,47 @@ def condition_guess(
     about = f"{column}: {MEANINGS[name]}"
     lacking = [table.source for table in tables if column not in table.names]
     if lacking:
-        why = f"not used, for {listed(lacking, 2)} {'lack' if lacking[1:] else 'lacks'} it"
-        return ConditionGuess(name, None, f"{about}, {why}")
+        why = f"{listed(lacking, 2)} {'lack' if lacking[1:] else 'lacks'} it"
+        return ConditionGuess(name, None, f"{about}, not used, for {why}")
     of_logs = [_values(table, column) for table in tables]
     if not all(map(len, of_logs)):
-        why = "not used, for too many of its cells hold no number"
-        return ConditionGuess(name, None, f"{about}, {why}")
+        why = "too many of its cells hold no number"
+        return ConditionGuess(name, None, f"{about}, not used, for {why}")
     values = np.concatenate(of_logs)
     reference = rounded(float(np.median(values)))
     unit = unit or _likely_unit(name, column, reference)
-    low, high = limits(name, unit, reference)
+    about += f", {_ends(values, unit)}"
+    why = _why_unusable(name, values, limits(name, unit, reference))
+    if why:
+        return ConditionGuess(name, None, f"{about}, not used, for {why}")
+    settings: Plain = {"column": column, "unit": unit, "reference": reference}
+    return ConditionGuess(name, settings, about)
+
+
+def _ends(values: Array, unit: str) -> str:
+    """Say from where to where values in a unit go."""
     least = float(values.min())
     most = float(values.max())
-    ends = f"{least:.4g} to {most:.4g} {unit}"
     if least == most:
-        ends = f"always {least:.4g} {unit}"
-    if low <= least and most <= high and (low > 0 or name != "engine_speed"):
-        settings: Plain = {"column": column, "unit": unit, "reference": reference}
-        return ConditionGuess(name, settings, f"{about}, {ends}")
-    why = "not used, for no machine works there"
-    if name == "engine_speed" and most > 0:
-        why = (
-            "not used, for it is off at times; to use it, leave these stretches out by "
-            f"log.work, and name it in log.{name}"
-        )
-    return ConditionGuess(name, None, f"{about}, {ends}, {why}")
+        return f"always {least:.4g} {unit}"
+    return f"{least:.4g} to {most:.4g} {unit}"
+
+
+def _why_unusable(name: Input, values: Array, works_within: Limits) -> str:
+    """Say why values are not those of a machine that works; "": they are."""
+    low, high = works_within
+    is_within = low <= values.min() and values.max() <= high
+    if name != "engine_speed":
+        return "" if is_within else "no machine works there"
+    # the least speed is a part of the median, which is 0 of an engine that is mostly off
+    if is_within and low > 0:
+        return ""
+    if values.max() <= 0:
+        return "no machine works there"
+    return (
+        "it is off at times; to use it, leave these stretches out by log.work, and name "
+        f"it in log.{name}"
+    )
 
 
 def _values(table: Table, name: str) -> Array:

@@ -8,7 +8,7 @@ given to the joints in order; beside columns that have one, a column without is 
 and named.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,19 +83,11 @@ def guess_columns(
     of_commands = command_entries(table, commands)
     of_angles = angle_entries(angles, arm)
     reasons += _joint_reasons(arm, (commands, of_commands), (angles, of_angles))
-    for column in columns:
-        if column.kind == "target":
-            reasons.append(
-                f"{column.name}: a position target of a controller, not a valve's opening"
-            )
+    reasons += _target_reasons(columns)
     unused = _unused(table, time, (*commands.values(), *angles.values()))
     used = {*table.names} - {*unused}
-    conditions: Plain = {}
-    for found in guess_conditions(tables, (*joints, *links), used):
-        reasons.append(found.reason)
-        if found.settings:
-            conditions[found.name] = found.settings
-    taken = [one["column"] for one in conditions.values()]
+    conditions = _condition_settings(tables, (*joints, *links), used, reasons)
+    taken = [settings["column"] for settings in conditions.values()]
     unused = tuple(name for name in unused if name not in taken)
     if unused:
         reasons.append(f"not used: {listed(unused)}")
@@ -107,11 +99,41 @@ def guess_columns(
         "period_s": nearest_period(step),
         "joints": _joint_settings(of_commands, of_angles),
     }
+    return ColumnGuess(log, tuple(reasons), unused, _mirrored(of_angles))
+
+
+def _target_reasons(columns: Sequence[Column]) -> list[str]:
+    """Return why columns that hold a controller's targets are not used."""
+    what = "a position target of a controller, not a valve's opening"
+    return [f"{column.name}: {what}" for column in columns if column.kind == "target"]
+
+
+def _condition_settings(
+    tables: Sequence[Table],
+    names: Sequence[str],
+    used: Collection[str],
+    reasons: list[str],
+) -> dict[str, Plain]:
+    """Return the settings of the columns that hold what the machine works under, by
+    quantity, and add the reasons.
+
+    `names`: of joints and links; columns that are `used` hold something else.
+    """
+    conditions = dict[str, Plain]()
+    for guess in guess_conditions(tables, names, used):
+        reasons.append(guess.reason)
+        if guess.settings:
+            conditions[guess.name] = guess.settings
+    return conditions
+
+
+def _mirrored(angles: Mapping[int, Entry]) -> dict[int, Plain]:
+    """Return the settings of angles that may be counted the other way, by joint."""
     mirrored = dict[int, Plain]()
-    for joint, angle in of_angles.items():
+    for joint, angle in angles.items():
         if angle.mirrored:
             mirrored[joint] = angle.mirrored
-    return ColumnGuess(log, tuple(reasons), unused, mirrored)
+    return mirrored
 
 
 def _unused(

@@ -126,9 +126,10 @@ class Log:
         begins = list[int]()
         for joint in np.flatnonzero(exceeds.any(axis=0)):
             reached = int(exceeds[:, joint].argmax())
-            sign = np.sign(self.command[: reached + 1, joint])
-            # a lever that is moved slowly leaves 0 earlier
-            before = np.flatnonzero(sign != sign[-1])
+            forward = np.sign(self.command[reached, joint])
+            sizes = forward * self.command[:reached, joint]
+            # a lever that is moved slowly leaves its rest earlier, which may be beside 0
+            before = np.flatnonzero(sizes <= sizes[:1].clip(min=0))
             begins.append(int(before[-1]) + 1 if len(before) else 0)
         return min(begins, default=first)
 

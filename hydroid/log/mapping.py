@@ -44,7 +44,10 @@ def map_signals(
         rods = rods_of(arm)
     time_unit = UNITS[settings.time.unit]
     # `Table.read` takes the first signal for the time
-    signals = [Signal(settings.time.column, "time", gain=time_unit.factor)]
+    time = Signal(
+        settings.time.column, "time", gain=time_unit.factor, setting_unit=time_unit
+    )
+    signals = [time]
     for kind in get_args(Kind):
         for joint, owner in enumerate(ranges, 1):
             columns = settings.columns(kind, joint)
@@ -72,6 +75,7 @@ def map_signals(
                 owner=owner,
                 rod=rod,
                 setting=_setting(settings, kind, joint, owner),
+                setting_unit=unit,
             )
             for part, name in enumerate(columns.column):
                 signals.append(replace(signal, name=name, part=part))

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.arrays import Array, record
+from hydroid.log.likely_units import larger_unit
 from hydroid.log.log import Log, LogFinding, log_finding
 from hydroid.log.mapping import angle_margin
 from hydroid.log.motion import END, LEAST_PATH, JointMotion, driven_joints, motion_of
@@ -209,7 +210,17 @@ def _still(joint: _Joint) -> Iterator[LogFinding]:
         yield joint.warning("frozen", joint.angle, when=when)
     if motion.push > MUCH_PUSH and 0 < motion.travel < HARDLY_MOVES:
         most = joint.angle.shown.way(motion.travel)
-        yield joint.warning("no motion", joint.angle, most=most)
+        yield joint.warning("no motion", joint.angle, most=most, unit=_in_unit(joint))
+
+
+def _in_unit(joint: _Joint) -> str:
+    """Say in which larger unit an angle that hardly moves may be; "" where in none."""
+    signal = joint.angle
+    unit = larger_unit(signal, joint.motion.log.angle_of(signal.joint))
+    if unit is None:
+        return ""
+    setting = f"{signal.setting}.unit: {unit.name}"
+    return f", and if {signal.shown.word}s are in {unit.name}, set {setting}"
 
 
 def motion_findings(logs: Sequence[Log], arm: Arm) -> Iterator[LogFinding]:

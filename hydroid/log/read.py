@@ -7,7 +7,7 @@ from pathlib import Path
 from hydroid.arrays import record
 from hydroid.errors import LogError
 from hydroid.log.bags import open_bag
-from hydroid.log.binary import BINARY, first_bytes
+from hydroid.log.binary import BINARY, TableReader, first_bytes
 from hydroid.log.checks import check_recording
 from hydroid.log.conditions import only_present
 from hydroid.log.csv import open_csv
@@ -53,7 +53,7 @@ PLAIN_READING = Reading()
 def open_table(
     path: Path, settings: LogSettings = DEFAULT, progress: Progress = no_progress
 ) -> Table:
-    """Open a log of any format, recognised by its first bytes.
+    """Open a log of any format, recognised by its first bytes, or else by its ending.
 
     The settings name the time column, and the period to which the channels of a bag are
     resampled.
@@ -69,10 +69,20 @@ def open_table(
         raise LogError(f"cannot be read ({reason})", path) from None
     if is_ros_2_bag:
         return _of_short_names(open_bag(path, settings, progress))
-    for name, (reader, starts) in BINARY.items():
-        if data.startswith(starts) or path.suffix.lower() == name:
-            return _of_short_names(reader(path, settings, progress))
-    return _of_short_names(open_csv(path, progress))
+    reader = _binary_reader(data, path.suffix.lower())
+    if reader is None:
+        return _of_short_names(open_csv(path, progress))
+    return _of_short_names(reader(path, settings, progress))
+
+
+def _binary_reader(data: bytes, ending: str) -> TableReader | None:
+    """Return what reads a file by its first bytes, or where no format begins so by its
+    ending; None: it is text."""
+    for reader, starts in BINARY.values():
+        if data.startswith(starts):
+            return reader
+    reader, _ = BINARY.get(ending, (None, ()))
+    return reader
 
 
 def _of_short_names(table: Table) -> Table:

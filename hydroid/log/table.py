@@ -18,7 +18,7 @@ from hydroid.errors import LogError
 from hydroid.findings import Level
 from hydroid.log.log import LogFinding, log_finding
 from hydroid.log.rods import Rod
-from hydroid.units import TURNING, Display, display
+from hydroid.units import NO_UNIT, TURNING, Display, Unit, display
 
 _DAY = 86_400 * 10**9
 """[ns]"""
@@ -50,6 +50,7 @@ class Signal:
         rest: value of a command before its first message, in a format of messages.
         rod: the cylinder whose length the cells of an angle are.
         setting: key of the settings that name its column.
+        setting_unit: in which they state scale and offset.
         reference: of an engine's speed, or an oil's temperature, in SI.
     """
 
@@ -66,6 +67,7 @@ class Signal:
     rest: float = 0.0
     rod: Rod | None = None
     setting: str = ""
+    setting_unit: Unit = NO_UNIT
     reference: float = 0.0
 
     @property
@@ -73,6 +75,11 @@ class Signal:
         """How messages write the angle, or the position of a joint that slides, that it
         holds."""
         return display(slides=self.unit not in ("", TURNING.unit))
+
+    @property
+    def scale(self) -> float:
+        """Factor on the cells that brings them to the unit of the settings."""
+        return self.gain / self.setting_unit.factor
 
     def __str__(self) -> str:
         if self.joint:

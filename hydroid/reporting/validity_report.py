@@ -93,14 +93,33 @@ def covered(settings: FitSettings, logs: Sequence[Log], joint: int) -> Covered:
     """Return what logs cover of a joint, numbered from 1."""
     arm = settings.arm
     commands = np.concatenate([log.command_of(joint) for log in logs])
-    measured = [log for log in logs if log.measures(joint)]
+    return Covered(
+        joint=arm.name_of(joint),
+        shown=arm.joint(joint).shown,
+        ends=_ends(logs, joint, commands),
+        smallest=_smallest(commands),
+        switched=tuple(s for s in SIGNS if only_command(logs, joint, s) is not None),
+        seconds=(_driven(logs, joint, 1.0), _driven(logs, joint, -1.0)),
+        range=[*arm.ranges.values()][joint - 1],
+    )
+
+
+def _ends(logs: Sequence[Log], joint: int, commands: Array) -> Array:
+    """Return the ends of a joint's commands, angles and speeds as `Covered` has them,
+    (3, 2); NaN of what no log measures."""
     ends = np.full((3, 2), np.nan)
     ends[0] = commands.min(initial=0.0), commands.max(initial=0.0)
+    measured = [log for log in logs if log.measures(joint)]
     if measured:
         angles = np.concatenate([log.angle_of(joint) for log in measured])
         speeds = np.concatenate([_speeds(log, joint) for log in measured])
         ends[1] = angles.min(), angles.max()
         ends[2] = speeds.min(), speeds.max()
+    return ends
+
+
+def _smallest(commands: Array) -> dict[float, float]:
+    """Return the smallest of the commands [%] that are no noise, by sign."""
     smallest = dict[float, float]()
     for sign in SIGNS:
         sizes = sign * commands
@@ -108,22 +127,16 @@ def covered(settings: FitSettings, logs: Sequence[Log], joint: int) -> Covered:
         if len(sizes):
             # a ramp passes small commands in no time
             smallest[sign] = float(np.percentile(sizes, 5))
-    seconds = [
-        sum(
-            log.period * np.sum(sign * log.command_of(joint) >= LEAST_COMMAND)
-            for log in logs
-        )
-        for sign in SIGNS
-    ]
-    return Covered(
-        joint=arm.name_of(joint),
-        shown=arm.joint(joint).shown,
-        ends=ends,
-        smallest=smallest,
-        switched=tuple(s for s in SIGNS if only_command(logs, joint, s) is not None),
-        seconds=(float(seconds[0]), float(seconds[1])),
-        range=[*arm.ranges.values()][joint - 1],
-    )
+    return smallest
+
+
+def _driven(logs: Sequence[Log], joint: int, sign: float) -> float:
+    """Return how long logs command a joint with a sign [s]."""
+    seconds = 0.0
+    for log in logs:
+        is_driven = sign * log.command_of(joint) >= LEAST_COMMAND
+        seconds += log.period * float(np.sum(is_driven))
+    return seconds
 
 
 def _speeds(log: Log, joint: int) -> Array:
@@ -161,27 +174,32 @@ def validity_section(run: FinishedRun) -> Section:
 def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[Lack]:
     """Yield what logs lack of single joints."""
     never = [one.joint for one in joints if len(one.smallest) < len(SIGNS)]
-    if never:
-        why = "The logs command one of them only."
-        yield Lack("both directions", f" of {listed(never)}", why)
-    low = [f"{one.joint} (now {_commands(one)} %)" for one in joints if _is_weak(one)]
-    if low:
-        yield Lack(
-            "larger commands", f" of {listed(low)}", "Beyond, speeds are extrapolated."
-        )
+    weak = [f"{one.joint} (now {_commands(one)} %)" for one in joints if _is_weak(one)]
     fast = [
         f"{one.joint} (now from {_least(one)} %)" for one in joints if _is_fast(one)
     ]
-    if fast:
-        why = "They show where the dead band ends."
-        yield Lack("smaller commands", f" of {listed(fast)}", why)
+    lacks = (
+        ("both directions", never, "The logs command one of them only."),
+        ("larger commands", weak, "Beyond, speeds are extrapolated."),
+        ("smaller commands", fast, "They show where the dead band ends."),
+        (
+            "other poses",
+            _narrow(joints),
+            "Gravity, inertia and the cylinder's lever change with the pose.",
+        ),
+    )
+    for what, where, why in lacks:
+        if where:
+            yield Lack(what, f" of {listed(where)}", why)
+
+
+def _narrow(joints: Sequence[Covered]) -> list[str]:
+    """Return the joints of whose range the logs cover little, and how much."""
     narrow = list[str]()
     for one in joints:
         if one.share is not None and one.share < MOST_TRAVEL:
             narrow.append(f"{one.joint} (now {100 * one.share:.0f} % of its range)")
-    if narrow:
-        why = "Gravity, inertia and the cylinder's lever change with the pose."
-        yield Lack("other poses", f" of {listed(narrow)}", why)
+    return narrow
 
 
 def _lacks_of_logs(run: FinishedRun, logs: Sequence[Log]) -> Iterator[Lack]:

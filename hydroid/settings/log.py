@@ -12,14 +12,14 @@ log:
 import re
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, ValidationInfo
 
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.settings.load import ByJoint, NotNegative, Settings
-from hydroid.units import UNITS
+from hydroid.units import units_of
 from hydroid.words import listed
 
 _PART = re.compile(r"\[\d+\]$")
@@ -43,19 +43,18 @@ JOINT = "{joint}"
 OTHER = "other"
 """the group of logs that are in no group of `groups`"""
 Kind = Literal["command", "angle", "pressure"]
-Unit = Literal["%", "deg", "rad", "m", "cm", "mm", "bar", "Pa", "MPa"]
-"""units of columns; the first one of what is measured is the default"""
-
-
-def _units_of(quantity: str) -> tuple[str, ...]:
-    return tuple(
-        unit for unit in get_args(Unit) if UNITS[unit.lower()].quantity == quantity
-    )
-
-
-ANGLES = _units_of("angle")
-LENGTHS = _units_of("length")
+COMMANDS = units_of("command")
+ANGLES = units_of("angle")
+LENGTHS = units_of("length")
 """units of positions, and of the lengths of cylinders"""
+PRESSURES = units_of("pressure")
+# a type checker cannot read a table
+if TYPE_CHECKING:
+    Unit = str
+    TimeUnit = str
+else:
+    Unit = Literal[*COMMANDS, *ANGLES, *LENGTHS, *PRESSURES]
+    TimeUnit = Literal[*units_of("time")]
 
 
 def _nonzero(value: float | None) -> float | None:
@@ -79,7 +78,7 @@ class TimeColumn(Settings):
 
     column: Name = "time_s"
     """name in the header; a ROS bag has a clock of its own and needs none"""
-    unit: Literal["s", "ms", "us", "ns", "min", "h", "day"] = "s"
+    unit: TimeUnit = "s"
     """unit of the cells; dates and times of day are recognised"""
 
 
@@ -93,9 +92,9 @@ class Columns(Settings):
     are subtracted; chamber A, which pushes to positive angles, and chamber B of a
     pressure. Default: u{joint}_pct, q{joint}_deg, [pA{joint}_bar, pB{joint}_bar]"""
     unit: Unit | None = None
-    """unit of the scaled cells: of the angle of a joint that slides m, cm or mm, which
-    of a joint that turns are the length of its cylinder from pin to pin; default: %,
-    deg, bar"""
+    """unit of the scaled cells; of the angle of a joint that slides it is one of
+    lengths, which of a joint that turns are the length of its cylinder from pin to pin;
+    default: %, deg, bar"""
     scale: Annotated[Number | None, AfterValidator(_nonzero)] = None
     """factor on the cells; default: 1"""
     offset: Number | None = None
@@ -187,9 +186,9 @@ class ColumnMap(NamedTuple):
 
 
 KINDS = {
-    "command": ((f"u{JOINT}_pct",), (1, 2), _units_of("command")),
+    "command": ((f"u{JOINT}_pct",), (1, 2), COMMANDS),
     "angle": ((f"q{JOINT}_deg",), (1,), (*ANGLES, *LENGTHS)),
-    "pressure": ((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), (2,), _units_of("pressure")),
+    "pressure": ((f"pA{JOINT}_bar", f"pB{JOINT}_bar"), (2,), PRESSURES),
 }
 """default columns of a quantity, how many may hold it, and their units, the default
 first"""

@@ -13,6 +13,7 @@ from log_formats import BagWriter, matlab, write_mat, write_mat73, write_parquet
 import hydroid
 from hydroid.errors import LogError
 from hydroid.log import FORMATS, Log, open_table
+from hydroid.log.binary import BINARY
 from hydroid.settings.log import LogSettings
 
 VALUES = cells()
@@ -232,6 +233,17 @@ def test_columns_of_parquet_that_are_not_used_are_not_unpacked(tmp_path: Path) -
         tracemalloc.stop()
     assert peak < 500_000
     same(log, tmp_path)
+
+
+def test_first_bytes_count_before_an_ending(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also if the format of the ending stands first in the table."""
+    parquet = write_parquet(tmp_path / "log.parquet", COLUMNS)
+    path = parquet.rename(tmp_path / "log.mat")
+    first = {".mat": BINARY[".mat"]}
+    monkeypatch.setattr("hydroid.log.read.BINARY", first | BINARY)
+    same(read(path)[0], tmp_path)
 
 
 def empty_bag(path: Path) -> Path:

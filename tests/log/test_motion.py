@@ -90,6 +90,16 @@ def test_the_noise_of_a_lever_is_rest_while_the_arm_stands(drift: float, rests: 
     assert np.array_equal(noisy_log.start, expected)
 
 
+@pytest.mark.parametrize("full", [50.0, -50.0])
+@pytest.mark.parametrize("beside", [0.8, -0.8])
+def test_a_lever_that_rests_beside_zero_rests(full: float, beside: float):
+    log = steps([0.0, full])
+    command = np.where(log.command == 0, beside, log.command)
+    at_rest = replace(log, command=command)
+    assert at_rest.first_command == log.first_command > 0
+    assert np.array_equal(at_rest.start, log.start)
+
+
 @pytest.mark.parametrize(("levels", "moves"), [([0.0, 50.0], 101), ([0.0] * 5, 300)])
 def test_rest_ends_with_the_first_command_or_after_two_seconds(
     levels: list[float], moves: int

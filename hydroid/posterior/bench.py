@@ -16,7 +16,7 @@ from hydroid.arrays import Array, record
 from hydroid.hydraulics.cylinder import rod_motion
 from hydroid.hydraulics.records import Records, coefficients
 from hydroid.log import Log, only_command
-from hydroid.log.command_sizes import ONE_SIZE
+from hydroid.log.command_sizes import ONE_SIZE, largest_commands
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
@@ -234,8 +234,8 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     alone = settings.changed({"simulation.other_joints": "locked"})
     scenario = make_scenario(load_model(arm), rest, [joint - 1], alone)
     only = (only_command(logs, joint, 1.0), only_command(logs, joint, -1.0))
-    commands = np.concatenate([log.command_of(joint) for log in logs])
-    reach = (float(max(commands.max(), 0.0)), float(max(-commands.min(), 0.0)))
+    negative, positive = largest_commands(logs, joint)
+    reach = (positive, -negative)
     return Bench(settings, joint, middle, period, scenario, only, reach)
 
 

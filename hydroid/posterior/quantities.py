@@ -344,7 +344,7 @@ class DirectionTest:
             name = f"speed_{command:g}"
             yield Figure(command, name, label, unit, speed[command], what="speed")
         gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
-        label = f"gain between command and speed at {pose}"
+        label = f"gain between command and speed from 40 to 60 % command, at {pose}"
         yield Figure(60.0, "gain", label, f"{unit} per %", gain, of_several=True)
 
     def _step_figures(self, after: Array, steady: Array) -> Iterator[Figure]:

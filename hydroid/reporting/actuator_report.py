@@ -5,13 +5,14 @@ answers to a step.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
-from hydroid.log.command_sizes import ONE_SIZE
+from hydroid.log.command_sizes import ONE_SIZE, largest_commands, smallest_commands
 from hydroid.reporting.actuator_tables import (
     RESPONSE_HEADER,
     bandwidth,
@@ -31,6 +32,18 @@ STILL = 20.0
 """by how much a command that stands still may change [%]: a joystick never rests"""
 AT_END = 0.02
 """part of a joint's travel in the logs within which it may stand at a stop"""
+
+
+class Commands(NamedTuple):
+    """What commands the logs give a joint [%]: the largest of both signs, and the
+    smallest, 0 of a sign without."""
+
+    negative: float
+    positive: float
+    least_negative: float
+    least_positive: float
+
+
 Words = Mapping[str, str]
 """what commands of a direction do with a joint, by the direction"""
 TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
@@ -79,7 +92,7 @@ def speed_section(
         opening = summary.curves.get(f"{name}_opening")
         cloud = _measured_cloud(logs, joint, _dead_times(name, summary))
         cloud[1] *= settings.arm.joint(joint).shown.factor
-        commands = np.concatenate([log.command_of(joint) for log in logs])
+        commands = _logged_commands(logs, joint)
         sides = _sides(name, summary)
         draw = partial(_speed_chart, name, (speed, opening), sides, commands, cloud)
         caption = f"{name}: {speed.label}"
@@ -138,11 +151,14 @@ def _dead_band(
     return getattr(settings.hydraulics, of_side), False
 
 
-def _fastest(name: str, speed: CurveEstimate, commands: Array, words: Words) -> str:
+def _fastest(name: str, speed: CurveEstimate, commands: Commands, words: Words) -> str:
     """Write the speeds of a joint at the largest commands of the logs, in both
     directions."""
     said = list[str]()
-    for towards, largest in _largest(commands).items():
+    for towards, largest in (
+        ("positive", commands.positive),
+        ("negative", commands.negative),
+    ):
         if largest:
             size = abs(np.interp(largest, speed.at, speed.value))
             word = words[towards] or towards
@@ -151,24 +167,37 @@ def _fastest(name: str, speed: CurveEstimate, commands: Array, words: Words) -> 
     return f"{name} {', '.join(said)}" if said else ""
 
 
-def _largest(commands: Array) -> dict[str, float]:
-    """Return the largest commands of the logs in both directions [%]."""
-    return {
-        "positive": float(commands.max(initial=0.0)),
-        "negative": float(commands.min(initial=0.0)),
-    }
+def _logged_commands(logs: Sequence[Log], joint: int) -> Commands:
+    smallest = smallest_commands(logs, joint)
+    return Commands(
+        *largest_commands(logs, joint),
+        least_negative=0.0 - smallest.get(-1.0, 0.0),
+        least_positive=smallest.get(1.0, 0.0),
+    )
 
 
-def _beyond(speed: CurveEstimate, commands: Array) -> str:
+def _beyond(speed: CurveEstimate, commands: Commands) -> str:
     """Say where a curve goes beyond the commands of the logs; nothing where it does
     not."""
-    ends = _largest(commands)
-    above = speed.at[-1] > ends["positive"] + ONE_SIZE
-    below = speed.at[0] < ends["negative"] - ONE_SIZE
-    if not above and not below:
+    above = speed.at[-1] > commands.positive + ONE_SIZE
+    below = speed.at[0] < commands.negative - ONE_SIZE
+    said = list[str]()
+    if above or below:
+        said.append(
+            f"beyond {_signed(commands.negative)} and {_signed(commands.positive)} %"
+        )
+    if commands.least_positive - commands.least_negative > 2 * ONE_SIZE:
+        inner = f"{_signed(commands.least_negative)} and {_signed(commands.least_positive)} %"
+        said.append(f"between {inner}")
+    if not said:
         return ""
-    reached = f"{ends['negative']:.0f} and {ends['positive']:+.0f} %".replace("-", "−")
-    return f"The logs reach {reached}; beyond, all is extrapolated."
+    return (
+        f"The logs have no commands {', nor '.join(said)}: there all is extrapolated."
+    )
+
+
+def _signed(command: float) -> str:
+    return f"{command:+.0f}".replace("-", "−").replace("+0", "0")
 
 
 def _sides(name: str, summary: FitSummary) -> dict[str, str]:
@@ -284,14 +313,14 @@ def _speed_chart(
     name: str,
     curves: tuple[CurveEstimate, CurveEstimate | None],
     sides: Mapping[str, str],
-    commands: Array,
+    commands: Commands,
     measured: Array,
 ) -> Chart:
     """Draw speed and opening of a joint over its logged commands, and measured pairs of
     command and speed, shape (2, n), in the curves' units."""
     speed, opening = curves
-    left = np.array([-105.0, commands.max(initial=0.0)])
-    right = np.array([commands.min(initial=0.0), 105.0])
+    left = np.array([-105.0, commands.least_negative, commands.positive])
+    right = np.array([commands.negative, commands.least_positive, 105.0])
     beyond = Mark("spans", left, end=right, color="pale", alpha=0.4)
     cloud = Mark(
         "points",

@@ -83,8 +83,8 @@ def _answer(by_itself: Sequence[str], by_command: Sequence[str]) -> str:
     if by_command:
         answers.append(f"with the command: {listed(by_command)}")
     if answers:
-        return f"no, the intervals may be too narrow; {'; '.join(answers)}"
-    return f"yes: no correlation is above {FAINT:g}"
+        return f"no, on the fitted logs, so intervals may be too narrow; {'; '.join(answers)}"
+    return f"yes, on the fitted logs: no correlation is above {FAINT:g}"
 
 
 def _tests(

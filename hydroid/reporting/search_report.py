@@ -87,7 +87,9 @@ def _reached(run: FinishedRun) -> str:
         if kind.startswith("behind nine numbers"):
             return f"no, or the model is wrong: nine numbers fit the logs better in {joints}"
     if joints := by_kind.get("several optima"):
-        return f"yes, the best of several at which the starts of {joints} ended"
+        return (
+            f"not known: starts of {joints} ended at different optima; the best is kept"
+        )
     said = f"yes: {summary.ending}"
     if any(len(ended) > 1 for ended in run.result.starts.values()):
         said += "; all starts ended there"

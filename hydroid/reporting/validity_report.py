@@ -14,7 +14,12 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.fitting.comparison import LEAST_BLOCKS
 from hydroid.log import Log
-from hydroid.log.command_sizes import only_command
+from hydroid.log.command_sizes import (
+    HELD,
+    largest_commands,
+    only_command,
+    smallest_commands,
+)
 from hydroid.log.log import LEAST_COMMAND
 from hydroid.reporting.actuator_report import OVER
 from hydroid.reporting.page import Cell, Section, Table
@@ -43,8 +48,8 @@ HEADER = (
 )
 _TEXT = (
     "What the fitted logs cover of each joint. Beyond it the model extrapolates. Positions are "
-    f"angles, or the way of a joint that slides. Speeds are means over {OVER:g} s. Driven: time "
-    "with positive and with negative commands."
+    f"angles, or the way of a joint that slides. Commands are those that the logs give for {HELD:g} s "
+    f"in all. Speeds are means over {OVER:g} s. Driven: time with positive and with negative commands."
 )
 
 
@@ -55,8 +60,8 @@ class Covered:
     Attributes:
         joint: its name.
         shown: how it is shown.
-        ends: smallest and largest commands [%], angles [rad] or positions [m], and
-            speeds, shape (3, 2).
+        ends: largest negative and positive commands [%], smallest and largest angles
+            [rad] or positions [m], and speeds, shape (3, 2).
         smallest: smallest command that is none of a lever's noise [%], by its sign;
             none of a direction without commands.
         switched: signs of the commands that are on or off.
@@ -92,23 +97,22 @@ class Lack(NamedTuple):
 def covered(settings: FitSettings, logs: Sequence[Log], joint: int) -> Covered:
     """Return what logs cover of a joint, numbered from 1."""
     arm = settings.arm
-    commands = np.concatenate([log.command_of(joint) for log in logs])
     return Covered(
         joint=arm.name_of(joint),
         shown=arm.joint(joint).shown,
-        ends=_ends(logs, joint, commands),
-        smallest=_smallest(commands),
+        ends=_ends(logs, joint),
+        smallest=smallest_commands(logs, joint),
         switched=tuple(s for s in SIGNS if only_command(logs, joint, s) is not None),
         seconds=(_driven(logs, joint, 1.0), _driven(logs, joint, -1.0)),
         range=[*arm.ranges.values()][joint - 1],
     )
 
 
-def _ends(logs: Sequence[Log], joint: int, commands: Array) -> Array:
+def _ends(logs: Sequence[Log], joint: int) -> Array:
     """Return the ends of a joint's commands, angles and speeds as `Covered` has them,
     (3, 2); NaN of what no log measures."""
     ends = np.full((3, 2), np.nan)
-    ends[0] = commands.min(initial=0.0), commands.max(initial=0.0)
+    ends[0] = largest_commands(logs, joint)
     measured = [log for log in logs if log.measures(joint)]
     if measured:
         angles = np.concatenate([log.angle_of(joint) for log in measured])
@@ -116,18 +120,6 @@ def _ends(logs: Sequence[Log], joint: int, commands: Array) -> Array:
         ends[1] = angles.min(), angles.max()
         ends[2] = speeds.min(), speeds.max()
     return ends
-
-
-def _smallest(commands: Array) -> dict[float, float]:
-    """Return the smallest of the commands [%] that are no noise, by sign."""
-    smallest = dict[float, float]()
-    for sign in SIGNS:
-        sizes = sign * commands
-        sizes = sizes[sizes >= LEAST_COMMAND]
-        if len(sizes):
-            # a ramp passes small commands in no time
-            smallest[sign] = float(np.percentile(sizes, 5))
-    return smallest
 
 
 def _driven(logs: Sequence[Log], joint: int, sign: float) -> float:

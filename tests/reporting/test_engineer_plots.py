@@ -321,7 +321,7 @@ def test_whether_the_optimum_was_reached_is_said_beside_the_heading():
         ({"converged": None}, "not known"),
         (
             {"findings": (several,)},
-            "yes, the best of several at which the starts of elbow",
+            "not known: starts of elbow ended at different optima",
         ),
         ({"findings": (several, behind)}, "no, or the model is wrong: nine numbers"),
     ):

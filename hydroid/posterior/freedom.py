@@ -41,7 +41,7 @@ def degrees_of_freedom(
             with more columns.
         scatter: covariance of the effects, shape (p, p).
     """
-    weights = np.linalg.inv(scatter)
+    weights = np.asarray(np.linalg.inv(scatter), dtype=float)
     least = np.inf
     for i in range(len(shown.signals)):
         variance = _variance(shown, fitted, i, effects, weights)

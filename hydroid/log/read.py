@@ -143,8 +143,7 @@ def check_parts(
                 recording, settings, len(ranges), findings, repair=reading.repair
             )
         del recording  # a long one is large
-        if reading.outputs is not None:
-            findings += _of_motion(parts, signals, settings, reading)
+        findings += _of_motion(parts, signals, settings, reading)
     except LogError as error:
         numbers = {"what": error.what, "hint": error.hint}
         findings.append(
@@ -160,11 +159,15 @@ def _of_motion(
     settings: LogSettings,
     reading: Reading,
 ) -> Iterator[LogFinding]:
-    """Yield what the motion in the parts of a log says against the settings."""
+    """Yield what the motion in the parts of a log says against the settings; nothing
+    where commands count alone."""
+    if reading.outputs is None:
+        return
     backward = reading.arm.backward if reading.arm else ()
-    outputs = reading.outputs or ()
     for part in parts:
-        yield from check_motion(part, signals, outputs, backward, settings.delay_s)
+        yield from check_motion(
+            part, signals, reading.outputs, backward, settings.delay_s
+        )
 
 
 def _read(

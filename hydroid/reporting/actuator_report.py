@@ -13,15 +13,21 @@ from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.log import Log
 from hydroid.log.command_sizes import ONE_SIZE, largest_commands, smallest_commands
+from hydroid.posterior.curves import LEAST_START, TIME_CONSTANTS
 from hydroid.reporting.actuator_tables import (
+    NEAR,
     RESPONSE_HEADER,
+    SETTLED,
+    Settling,
     bandwidth,
     response_rows,
+    settling_time,
     speed_table,
 )
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
 from hydroid.reporting.page import Cell, Plot, Section, Table
 from hydroid.reporting.parameters_report import SIDES, direction_word
+from hydroid.reporting.stated_values import value_and_origin, value_of
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
@@ -30,6 +36,10 @@ OVER = 0.25
 stood still"""
 STILL = 20.0
 """by how much a command that stands still may change [%]: a joystick never rests"""
+STEADY = 0.2
+"""part of a steady speed by which those in both halves of OVER may differ"""
+SLOW = 0.05
+"""part of the fastest speed below which a speed may differ as one of this size"""
 AT_END = 0.02
 """part of a joint's travel in the logs within which it may stand at a stop"""
 
@@ -57,6 +67,11 @@ _SPEED = (
     "under any load, against the command one dead time earlier. Grey: commands that the logs do "
     "not contain."
 )
+_PUMP = (
+    " The joint moves alone. The pump limits its speed, too: it gives at most {pump}. Where the "
+    "load pulls the joint faster than the pump fills its chamber, the valve alone limits it."
+)
+_NO_PUMP = " The model's pump has no limit: speeds are those of the valve."
 _SPEED_ALONE = (
     "Lines: the model's steady speed at mid travel, with the sign of the angle. Bands: 95 % "
     "intervals. Points: measured speeds, in any pose and under any load. Grey: "
@@ -65,12 +80,20 @@ _SPEED_ALONE = (
 _STEP = (
     "How fast and how late the joint follows its command, from rest at mid travel: its speed "
     "after a step, above 0 in the direction of the command, and the frequency response "
-    "computed from it. Bands: 95 % intervals."
+    "computed from it. Bands: 95 % intervals. A curve ends where the logs do not determine it. "
+    "Frequencies go up to a quarter of the logs' rate, {rate:g} Hz."
 )
 _TABLE = (
-    " Tables: measured is the median of the measured speeds within 5 % of the command."
+    f" Tables: measured is the median of the measured speeds within {NEAR:g} % of the command. A "
+    f"speed is measured over {OVER:g} s where it was steady: both halves differ by "
+    f"{100 * STEADY:.0f} % at most, and within {2 * OVER:g} s the command changed by {STILL:g} % at most."
 )
-_RESPONSES = "In brackets: 95 % intervals. Phase: of the speed behind the command."
+_RESPONSES = (
+    "In brackets: 95 % intervals. Settling time: from the step until the speed stays within "
+    f"{100 * SETTLED:.0f} % of what it is {TIME_CONSTANTS:g} time constants after the dead time, "
+    f"or {LEAST_START:g} s after the step if that is later; over: it does not until then. Phase: "
+    "of the speed behind the command."
+)
 
 
 def speed_section(
@@ -102,7 +125,7 @@ def speed_section(
         if opening is not None:
             shut.append(f"{name} {_dead_bands(settings, summary, joint)}")
         table = speed_table(name, speed, opening, cloud)
-        note = _beyond(speed, commands)
+        note = _beyond(speed, commands) + _pulled(settings, summary, joint, speed)
         cards[f"speed_{name}"] = replace(table, note=note)
     if not tabs:
         return None
@@ -112,12 +135,57 @@ def speed_section(
     answer = f"speed at the largest commands of the logs: {'; '.join(fastest)}"
     if shut:
         title = "Valve: dead band, opening, and speed against command"
-        text = _SPEED
+        text = _SPEED + _pump_words(settings, summary)
         answer = f"dead band: {listed(shut)}; {answer}"
     text += _TABLE
     return Section(
         title, text, tabs=tuple(tabs), cards=cards, folded=True, answer=answer
     )
+
+
+def _pump_words(settings: FitSettings, summary: FitSummary) -> str:
+    """Say whether the pump limits the speeds of a joint that moves alone."""
+    if value_of(settings, summary, "pump_flow")[0] is None:
+        return _NO_PUMP
+    return _PUMP.format(pump=value_and_origin(settings, summary, "pump_flow"))
+
+
+def _pulled(
+    settings: FitSettings, summary: FitSummary, joint: int, speed: CurveEstimate
+) -> str:
+    """Say from which commands on a joint takes more oil than the pump gives; nothing
+    where it never does.
+
+    A load that pulls the joint does not wait until its chamber is full.
+    """
+    name = settings.arm.name_of(joint)
+    pump = value_of(settings, summary, "pump_flow")[0]
+    said = list[str]()
+    for side, towards in SIDES.items():
+        flow = summary.quantities.get(f"{name}_full_flow_{towards}")
+        draw = value_of(settings, summary, f"draw_{side.lower()}", joint)[0]
+        if pump is None or flow is None or draw is None:
+            continue
+        rows = _of_sign(speed, towards)
+        wanted = (
+            draw * flow.value * np.abs(rows[1] / rows[1, np.argmax(np.abs(rows[0]))])
+        )
+        beyond = rows[0, wanted > pump]
+        if len(beyond):
+            said.append(f"{_signed(beyond[np.argmin(np.abs(beyond))])} %")
+    if not said:
+        return ""
+    return (
+        f" From {listed(said)} on, the load pulls the joint faster than the pump fills its chamber, "
+        "which grows by more than the pump gives."
+    )
+
+
+def _of_sign(curve: CurveEstimate, towards: str) -> Array:
+    """Return the rows of a curve at commands of a sign, as `_rows` has them."""
+    rows = _rows(curve)
+    sign = 1.0 if towards == "positive" else -1.0
+    return rows[:, sign * rows[0] > 0]
 
 
 def _dead_bands(settings: FitSettings, summary: FitSummary, joint: int) -> str:
@@ -141,14 +209,9 @@ def _dead_band(
     whole = f"{settings.arm.name_of(joint)}_dead_band_{SIDES[side]}"
     if whole in summary.quantities:
         return summary.quantities[whole].value, True
-    of_side = f"dead_band_{side.lower()}"
-    for name, parameter in settings.parameters.items():
-        is_here = joint in (parameter.joints or ())
-        # an effect of a group of logs adds to the dead band
-        is_effect = parameter.per is not None
-        if is_here and not is_effect and parameter.quantity in ("dead_band", of_side):
-            return summary.estimate[name].value, parameter.fixed is None
-    return getattr(settings.hydraulics, of_side), False
+    quantity = f"dead_band_{side.lower()}"
+    value, estimate = value_of(settings, summary, quantity, joint)
+    return value or 0.0, estimate is not None
 
 
 def _fastest(name: str, speed: CurveEstimate, commands: Commands, words: Words) -> str:
@@ -230,6 +293,7 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     tabs = list[Plot]()
     slowest = list[str]()
     narrowest = list[str]()
+    settled = list[str]()
     rows = list[tuple[Cell, ...]]()
     for joint in settings.outputs:
         name = settings.arm.name_of(joint)
@@ -240,6 +304,8 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         tabs.append(Plot(f"step_{len(tabs) + 1}", caption, draw, button=name))
         if dead_times := _dead_times(name, summary):
             slowest.append(f"{name} {two_digits(max(dead_times))} s")
+        if times := _settling_times(name, summary):
+            settled.append(f"{name} {max(times)} s")
         if widths := _bandwidths(name, summary.curves):
             narrowest.append(f"{name} {two_digits(min(widths))} Hz")
         for towards in TOWARDS:
@@ -252,11 +318,14 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         answers.append(f"dead time: {listed(slowest)}")
     if narrowest:
         answers.append(f"bandwidth (-3 dB): {listed(narrowest)}")
+    if settled:
+        answers.append(f"settling time ({100 * SETTLED:.0f} %): {listed(settled)}")
     title = "Step and frequency response"
+    text = _STEP.format(rate=1.0 / settings.log.period_s)
     tables = {"responses": Table("", RESPONSE_HEADER, tuple(rows), _RESPONSES)}
     return Section(
         title,
-        _STEP,
+        text,
         tabs=tuple(tabs),
         tables=tables,
         folded=True,
@@ -271,9 +340,15 @@ def _bandwidths(name: str, curves: Mapping[str, CurveEstimate]) -> list[float]:
     return [width for width in both if width is not None]
 
 
+def _settling_times(name: str, summary: FitSummary) -> list[Settling]:
+    """Return when the steps of a joint in both directions settle."""
+    times = (settling_time(name, towards, summary) for towards in TOWARDS)
+    return [time for time in times if time is not None]
+
+
 def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:
     """Return commands [%] and speeds [rad/s] of a joint, from 1, where its command
-    stood still, (n,) each.
+    stood still and its speed was steady, (n,) each.
 
     The command is that of `delay` [s] before. Stretches of OVER do not overlap; those
     without a command, and those near an end of the travel, are left out.
@@ -285,6 +360,9 @@ def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:
     low = np.min(angle)
     high = np.max(angle)
     margin = AT_END * (high - low)
+    # of a joint that stands still, the sensor's noise is no speed
+    ways = angle[2 * half :] - angle[: -2 * half]
+    least = SLOW * float(np.max(np.abs(ways), initial=0.0))
     commands = list[float]()
     speeds = list[float]()
     for middle in range(steps + 3 * half, len(angle) - half, 2 * half):
@@ -292,8 +370,12 @@ def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:
         free = low + margin < angle[middle] < high - margin
         if not free or np.ptp(held) > STILL or not np.any(held):
             continue
+        before = angle[middle] - angle[middle - half]
+        after = angle[middle + half] - angle[middle]
+        way = before + after
+        if abs(after - before) > 0.5 * STEADY * max(abs(way), least):
+            continue
         commands.append(float(held[2 * half :].mean()))
-        way = angle[middle + half] - angle[middle - half]
         speeds.append(float(way / (2 * half * log.period)))
     return np.array(commands), np.array(speeds)
 
@@ -344,10 +426,8 @@ def _speed_chart(
 def _both_sides(curve: CurveEstimate, sides: Mapping[str, str]) -> list[Mark]:
     """Draw a curve against the command, with the dead band between its two sides."""
     marks = list[Mark]()
-    rows = _rows(curve)
-    for sign, towards in (1.0, "positive"), (-1.0, "negative"):
-        of_side = rows[:, sign * rows[0] > 0]
-        marks += _banded(of_side, TOWARDS[towards], f"model, {sides[towards]}")
+    for towards, color in TOWARDS.items():
+        marks += _banded(_of_sign(curve, towards), color, f"model, {sides[towards]}")
     return marks
 
 
@@ -387,10 +467,20 @@ def _response_panel(y: str, curves: Mapping[str, CurveEstimate]) -> Panel:
     unit = ""
     for towards, curve in curves.items():
         label = _answered(curve, towards)
-        marks += _banded(_rows(curve), TOWARDS[towards], label)
+        marks += _banded(_determined(_rows(curve)), TOWARDS[towards], label)
         along = curve.along
         unit = curve.unit
     return Panel(along, f"{y} [{unit}]", tuple(marks), height=200)
+
+
+def _determined(rows: Array) -> Array:
+    """Return rows as `_rows` has them, NaN where a curve has no interval, though it has
+    elsewhere: a line without its band would look as if it were known exactly."""
+    is_open = np.isnan(rows[2:]).any(axis=0)
+    if is_open.all():
+        return rows
+    rows[1:, is_open] = np.nan
+    return rows
 
 
 def _answered(curve: CurveEstimate, towards: str) -> str:

@@ -2,11 +2,13 @@
 tables: every tenth per cent of command, 1 Hz."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.arrays import Array
 from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
+from hydroid.posterior.curves import LEAST_START, TIME_CONSTANTS
 from hydroid.reporting.page import Cell, Table
 from hydroid.words import interval_words, three_digits, two_digits, value_words
 
@@ -18,6 +20,11 @@ LEAST_MEASURED = 5
 """measured speeds that a median is taken of"""
 LEAST_PART = 1e-3
 """of the top speed, below which a measured speed is shown as 0"""
+SETTLED = 0.05
+"""part of the speed within which it stays when a step has settled"""
+NOT_YET = 0.9
+"""part of the time that a step has to settle, after which it cannot be told whether it
+has"""
 PHASE_AT = 1.0
 """frequency at which the phase is stated [Hz]"""
 
@@ -68,6 +75,7 @@ RESPONSE_HEADER = (
     "step to",
     "dead time [s]",
     "time constant [s]",
+    f"settling time ({100 * SETTLED:.0f} %) [s]",
     "bandwidth (-3 dB) [Hz]",
     f"phase at {PHASE_AT:g} Hz [deg]",
 )
@@ -82,14 +90,56 @@ def response_rows(name: str, towards: str, summary: FitSummary) -> tuple[Cell, .
     # the command and the direction
     label = step.label.partition(" to ")[2] if step else towards
     width = bandwidth(amplitude) if amplitude else None
+    settling = settling_time(name, towards, summary)
     return (
         name,
         label,
         _quantity(summary.quantities.get(f"{name}_dead_time_{towards}")),
         _quantity(summary.quantities.get(f"{name}_time_constant_{towards}")),
+        None if settling is None else str(settling),
         None if width is None else two_digits(width),
         None if phase is None else _at(phase, PHASE_AT),
     )
+
+
+class Settling(NamedTuple):
+    """When a step has settled [s]; or, if it is `open`, that it has not until then."""
+
+    seconds: float
+    open: bool
+
+    def __str__(self) -> str:
+        """Write it as "0.76", or "over 1.1"."""
+        return f"{'over ' if self.open else ''}{two_digits(self.seconds)}"
+
+
+def settling_time(name: str, towards: str, summary: FitSummary) -> Settling | None:
+    """Return when a joint's speed has settled after a step in a direction; None where the
+    fit has no such step, or does not state when it begins to move.
+
+    The speed that counts is that at the end of the step's start, as in
+    `posterior.curves`: further on the joint has left its pose.
+    """
+    step = summary.curves.get(f"{name}_step_{towards}")
+    onset = summary.quantities.get(f"{name}_dead_time_{towards}")
+    risen = summary.quantities.get(f"{name}_time_constant_{towards}")
+    if step is None or onset is None or risen is None:
+        return None
+    at = np.array(step.at)
+    start = max(onset.value + TIME_CONSTANTS * risen.value, LEAST_START)
+    start = min(start, float(at[-1]))
+    speed = np.array(step.value)
+    settled = float(np.interp(start, at, speed))
+    # above 0 outside
+    outside = np.abs(speed - settled) - SETTLED * abs(settled)
+    last = np.flatnonzero((outside > 0.0) & (at < start))
+    if not len(last):
+        return Settling(float(at[0]), open=False)
+    ends = slice(last[-1], last[-1] + 2)
+    seconds = float(np.interp(0.0, -outside[ends], at[ends]))
+    if seconds > NOT_YET * start:
+        return Settling(start, open=True)
+    return Settling(seconds, open=False)
 
 
 def bandwidth(amplitude: CurveEstimate) -> float | None:

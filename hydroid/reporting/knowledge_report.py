@@ -159,7 +159,8 @@ def every_quantity_section(
     note = "95 %: confidence interval; empty: no limit."
     text = (
         "What follows from the parameters of each joint. Quantities that are parameters "
-        "themselves, such as the dead band of a pilot stage, are in the table of parameters."
+        "themselves, such as the dead band of a pilot stage, are in the table of parameters. Flow: "
+        "what the growing chamber could take in. It exceeds the pump's where a load pulls the joint."
     )
     tables = {"quantities": Table("", header, tuple(rows), note)}
     answer = f"{len(rows)}, with intervals"

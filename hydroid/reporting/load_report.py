@@ -8,7 +8,7 @@ from hydroid.log import Log
 from hydroid.posterior.posterior import stored_posterior
 from hydroid.posterior.under_load import Known, MovedUnderLoad, UnderLoad, under_load
 from hydroid.reporting.page import Cell, Section, Table
-from hydroid.reporting.parameters_report import origin
+from hydroid.reporting.stated_values import value_and_origin
 from hydroid.settings.fit import FitSettings
 from hydroid.words import interval_words, three_digits, value_words
 
@@ -77,14 +77,7 @@ def leakage(settings: FitSettings, summary: FitSummary, joint: int) -> str:
     """Say how large the leakage of a joint's valve is, and whether it is known."""
     if not settings.rung.has("leakage"):
         return "none in this model"
-    for name, parameter in settings.parameters.items():
-        is_here = joint in (parameter.joints or (joint,))
-        if parameter.quantity == "leakage" and parameter.per is None and is_here:
-            estimate = summary.estimate[name]
-            between = interval_words(*estimate.interval) or "no interval"
-            value = value_words(estimate.value, *estimate.interval)
-            return f"{value} {estimate.unit} ({between}; {origin(estimate)})"
-    return f"{settings.hydraulics.leakage:g} mm² (fixed)"
+    return value_and_origin(settings, summary, "leakage", joint)
 
 
 def _answer(
@@ -115,7 +108,8 @@ def _answer(
 
 
 def _percent(change: Known) -> str:
-    return f"{change.value:+.0f} %".replace("-", "−")
+    percent = round(change.value)
+    return f"{percent:+d} %".replace("-", "−") if percent else "0 %"
 
 
 def _carried_row(settings: FitSettings, one: UnderLoad) -> tuple[Cell, ...]:

@@ -7,21 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from hydroid.arrays import Array
+from hydroid.estimate import FitSummary
 from hydroid.fitting.validation import Prediction
 from hydroid.prediction import OilTrace
 from hydroid.reporting.page import Cell, Section, Table, log_names
 from hydroid.reporting.response_report import BAR, LITRES_PER_MINUTE
+from hydroid.reporting.stated_values import value_and_origin, value_of
 from hydroid.settings.arm import Arm
-from hydroid.words import listed, three_digits
+from hydroid.settings.fit import FitSettings
+from hydroid.words import listed, three_digits, two_digits
 
 _TEXT = (
     "The largest values in all logs of this page, as the model simulates them. Choose a joint "
     "in a log above to see them over time."
 )
 _NO_PUMP = (
-    " The model has no pump: the supply has the same pressure at any flow, and no joint takes "
+    " The model's pump has no limit: the supply has {supply} at any flow, and no joint takes "
     "another's."
 )
+_PUMP = (
+    " The pump gives at most {flow}, and its line has at most {supply}, where the relief valve "
+    "opens."
+)
+_NO_RELIEF = " The model has no relief valves at the actuators."
 _HEADER = (
     "joint",
     "pressure in A up to [bar]",
@@ -42,27 +50,52 @@ class _Peak:
     time: float
 
 
-def oil_section(arm: Arm, predictions: Sequence[Prediction]) -> Section | None:
+def oil_section(
+    settings: FitSettings, summary: FitSummary, predictions: Sequence[Prediction]
+) -> Section | None:
     """Return the section of the largest pressures and flows.
 
     None: the model has no hydraulics, or every simulation diverged.
     """
     usable = [p for p in predictions if p.oil and np.isfinite(p.response).all()]
-    rows = _joint_rows(arm, usable)
+    rows = _joint_rows(settings.arm, usable)
     if not rows:
         return None
     tables = {"oil": Table("", _HEADER, tuple(rows))}
-    text = _TEXT + _NO_PUMP
+    supply = value_and_origin(settings, summary, "supply_pressure")
+    pump_words = _NO_PUMP
+    most = ""
     flows = listed([f"{row[0]} {row[3]} L/min" for row in rows])
-    answer = f"flow in up to: {flows}; no pump"
+    answer = f"flow in up to: {flows}; no limit of the pump"
     if pump := _pump_row(usable):
-        text = _TEXT
+        pump_words = _PUMP
+        most = value_and_origin(settings, summary, "pump_flow")
         tables["pump"] = Table("", _PUMP_HEADER, (pump,))
         _, high, low, log, time = pump
-        answer = f"the pump's line falls from {high} to {low} bar ({log}, {time} s)"
+        flow = two_digits(value_of(settings, summary, "pump_flow")[0] or 0.0)
+        answer = (
+            f"the pump's line falls from {high} to {low} bar ({log}, {time} s); "
+            f"the pump gives at most {flow} L/min"
+        )
+    measured = _measured_words(predictions)
+    text = (
+        f"{_TEXT} {measured.capitalize()}."
+        + pump_words.format(supply=supply, flow=most)
+        + _NO_RELIEF
+    )
+    answer += f"; {measured}"
     return Section(
         "Pressures and flows", text, tables=tables, folded=True, answer=answer
     )
+
+
+def _measured_words(predictions: Sequence[Prediction]) -> str:
+    """Say whether the logs measure pressures."""
+    logs = {one.log.source: one.log.pressure for one in predictions}
+    measured = [p for p in logs.values() if p is not None and np.isfinite(p).any()]
+    if not measured:
+        return "no log measures pressures"
+    return f"{len(measured)} of {len(logs)} logs measure pressures"
 
 
 def _joint_rows(arm: Arm, predictions: Sequence[Prediction]) -> list[tuple[Cell, ...]]:

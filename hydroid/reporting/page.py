@@ -274,6 +274,14 @@ class Section:
     answer: str = ""
     printed: bool = False
 
+    @property
+    def chosen(self) -> Plot | None:
+        """The tab that is open at first: where some rows have a figure beside them, the
+        first tab of such a row."""
+        rows = {plot.row for plot in self.beside}
+        with_figure = (tab for tab in self.tabs if tab.row in rows)
+        return next(with_figure, self.tabs[0] if self.tabs else None)
+
 
 @record
 class Page:

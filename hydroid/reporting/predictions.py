@@ -156,7 +156,7 @@ def _fit_sections(
         validity_section(run),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
-        oil_section(settings.arm, shown),
+        oil_section(settings, summary, shown),
         speed_section(settings, summary, logs),
         step_section(settings, summary),
         load_section(run.model, logs),
@@ -208,7 +208,8 @@ def _made_from(run: FinishedRun) -> tuple[str, ...]:
     seconds = sum(prediction.log.duration for prediction in run.result.fitted)
     count = len(dict.fromkeys(logs))
     counted = f"{count} log{'s' if count > 1 else ''}, {seconds:.0f} s of data"
-    sampled = f"{counted} at {1.0 / run.settings.log.period_s:.3g} Hz"
+    period = run.settings.log.period_s
+    sampled = f"{counted}, resampled every {period:g} s ({1.0 / period:.3g} Hz)"
     fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
     made_from = [fitted_to, settings, f"seed {run.seed}"]
     if run.seconds:

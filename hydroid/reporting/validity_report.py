@@ -47,7 +47,8 @@ HEADER = (
     "driven [s]",
 )
 _TEXT = (
-    "What the fitted logs cover of each joint. Beyond it the model extrapolates. Positions are "
+    "What the fitted logs, resampled every {period:g} s, cover of each joint. Beyond it the model "
+    "extrapolates. Positions are "
     f"angles, or the way of a joint that slides. Commands are those that the logs give for {HELD:g} s "
     f"in all. Speeds are means over {OVER:g} s. Driven: time with positive and with negative commands."
 )
@@ -155,7 +156,7 @@ def validity_section(run: FinishedRun) -> Section:
     )
     return Section(
         "Range of validity, and what to log next",
-        _TEXT,
+        _TEXT.format(period=settings.log.period_s),
         points=tuple(points),
         tables={"covered": Table("", HEADER, tuple(map(_row, joints)))},
         folded=True,

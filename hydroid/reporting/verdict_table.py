@@ -39,6 +39,16 @@ _TESTED = (
     "more logs would show which model errs less. Good up to: the tolerance of errors over "
     "whole logs, by default 2 % of travel."
 )
+_RULES = {
+    Verdict.PREDICTS: "within the tolerance over whole logs",
+    Verdict.MISFIT: "errs on the fitted logs by more than the tolerance and a simple model",
+    Verdict.NO_BETTER: "after 1, 5 or 10 s worse than this simple model, and never better",
+    Verdict.WORSE_THAN_FITTED: "over whole logs, errs more than twice as much on unseen as on fitted ones",
+    Verdict.LITTLE: "errs by more than half of what standing still does",
+    Verdict.UNTOLD: "after 1, 5 and 10 s neither better nor worse than this simple model",
+    Verdict.ROUGHLY: "none of the others; after 1, 5 or 10 s better than each simple model",
+}
+"""when a joint has a verdict, the rule that is asked first in front"""
 _NO_WORD = f" Whole logs are compared from {LEAST_BLOCKS} logs on."
 WHOLE = "whole logs"
 """name of a column"""
@@ -201,9 +211,20 @@ def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
     what to do next.
     """
     table = verdict_table(fits)
-    table = replace(table, note=f"{table.note} {_RIVALS}")
+    table = replace(table, note=f"{_rules(fits)}{table.note} {_RIVALS}")
     verdict = Section("Verdict", tables={"verdict": table})
     return (verdict, Section("Next", steps=steps)) if steps else (verdict,)
+
+
+def _rules(fits: Verdicts) -> str:
+    """Say by which rules joints have the verdicts that the table shows."""
+    shown = {verdict.verdict for verdicts in fits.values() for verdict in verdicts}
+    said = [
+        f"{verdict.capitalize()}: {rule}. "
+        for verdict, rule in _RULES.items()
+        if verdict in shown
+    ]
+    return "".join(said)
 
 
 def horizon_section(fits: Verdicts) -> Section | None:

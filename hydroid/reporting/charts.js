@@ -243,7 +243,10 @@
   const idle = () => new Promise((done) => setTimeout(done, 0));
   let drawings = {};
   async function drawVisible(again = false) {
-    for (const host of document.querySelectorAll(".chart"))
+    const isOut = (host) => Boolean(host.closest("[hidden]"));
+    // last those that are drawn for paper alone
+    const hosts = [...document.querySelectorAll(".chart")].filter((host) => !host.closest("details:not([open])"));
+    for (const host of hosts.sort((a, b) => isOut(a) - isOut(b)))
       if (host.offsetParent !== null && !again && drawn.has(host)) zoomAlike(host);
       else if (host.offsetParent !== null) { await draw(host, drawings[host.dataset.drawing]); await idle(); }
   }
@@ -280,6 +283,11 @@
       };
     });
   }
+
+  // charts are as wide as they are now
+  addEventListener("beforeprint", () => document.querySelectorAll(".panels").forEach((one) => {
+    if (one.clientWidth) one.style.setProperty("--drawn", one.clientWidth);
+  }));
 
   // what must stand on paper though it is folded
   const opened = [];

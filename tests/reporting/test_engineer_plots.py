@@ -66,6 +66,23 @@ def test_a_step_of_the_command_gives_its_speed_and_what_is_late_is_not_mixed_up(
     assert len(unshifted) == 0  # never driven
 
 
+def test_speeds_that_still_change_are_not_taken_for_those_of_their_command():
+    time = 0.01 * np.arange(2000)
+    command = np.where(time % 5.0 < 2.5, 40.0, -40.0)
+    # of first order, with a time constant of 0.5 s
+    speed = np.zeros_like(time)
+    for k in range(1, len(time)):
+        speed[k] = speed[k - 1] + 0.02 * (0.01 * command[k - 1] - speed[k - 1])
+    angle = np.cumsum(0.01 * speed)
+    log = Log("a", time, command[:, None], angle[:, None], 0.01)
+    commands, speeds = measured_speeds(log, 1, 0.0)
+    assert len(speeds) > 10
+    ratio = speeds / (0.01 * commands)
+    # a fifth between halves 0.125 s apart: what is to come is at most 0.8 of the speed
+    assert ratio.min() > 0.5
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.2)
+
+
 def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     section = speed_section(SETTINGS, SUMMARY, PROBLEM.logs)
     assert section is not None

@@ -20,7 +20,7 @@ from hydroid.estimate import FitSummary
 from hydroid.fitting.search import HISTORY
 from hydroid.fitting.verdict import judge
 from hydroid.joint_verdict import Comparison, JointVerdict, Outcome, Verdict
-from hydroid.reporting.page import Page, Section, Table
+from hydroid.reporting.page import Page, Plot, Section, Table
 from hydroid.reporting.page_file import html, write_figures, write_page, write_tables
 from hydroid.reporting.predictions import fit_page, validation_page
 from hydroid.reporting.verdict_table import (
@@ -29,6 +29,7 @@ from hydroid.reporting.verdict_table import (
     left_out_table,
     next_step,
     ordered,
+    verdict_sections,
     verdict_table,
     worst,
 )
@@ -251,6 +252,13 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "good up to": "1",
     }
     assert "Good up to: the tolerance" in table.note
+    # the page also says by which rule; of the verdicts that it shows alone
+    section = verdict_sections({"a": [one]})[0]
+    note = section.tables["verdict"].note
+    assert note.startswith(
+        "Cannot be told: after 1, 5 and 10 s neither better nor worse"
+    )
+    assert "Predicts roughly" not in note
     assert lead({"a": [one]}).startswith(
         "boom: cannot be told from nine numbers (2 unseen logs)"
     )
@@ -421,3 +429,11 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path: Path):
     )
     with pytest.raises(RunError, match="cannot be written"):
         write_page(page, tmp_path)
+
+
+def test_a_page_opens_on_the_first_log_whose_arm_it_shows_in_motion():
+    tabs = [Plot("", "", dict, row=row) for row in ("a", "a", "b", "c")]
+    assert Section("", tabs=tuple(tabs)).chosen == tabs[0]
+    beside = tuple(Plot("", "", dict, row=row) for row in ("c", "b"))
+    assert Section("", tabs=tuple(tabs), beside=beside).chosen == tabs[2]
+    assert Section("").chosen is None

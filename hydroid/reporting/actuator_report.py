@@ -83,6 +83,7 @@ _STEP = (
     "computed from it. Bands: 95 % intervals. A curve ends where the logs do not determine it. "
     "Frequencies go up to a quarter of the logs' rate, {rate:g} Hz."
 )
+_NO_SPRING = " This model has no spring of oil: it states no natural frequency."
 _TABLE = (
     f" Tables: measured is the median of the measured speeds within {NEAR:g} % of the command. A "
     f"speed is measured over {OVER:g} s where it was steady: both halves differ by "
@@ -322,6 +323,10 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         answers.append(f"settling time ({100 * SETTLED:.0f} %): {listed(settled)}")
     title = "Step and frequency response"
     text = _STEP.format(rate=1.0 / settings.log.period_s)
+    # the oil of the dynamic model is a spring by itself
+    rings = value_of(settings, summary, "oil_frequency")[0] is not None
+    if settings.rung.has("oil_frequency") and not rings:
+        text += _NO_SPRING
     tables = {"responses": Table("", RESPONSE_HEADER, tuple(rows), _RESPONSES)}
     return Section(
         title,
@@ -329,7 +334,7 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         tabs=tuple(tabs),
         tables=tables,
         folded=True,
-        answer="; ".join(answers),
+        answer=f"in the slower direction: {'; '.join(answers)}" if answers else "",
     )
 
 

@@ -26,8 +26,8 @@ _NO_PUMP = (
     "another's."
 )
 _PUMP = (
-    " The pump gives at most {flow}, and its line has at most {supply}, where the relief valve "
-    "opens."
+    " The pump gives all joints together at most {flow}, and its line has at most {supply}, where "
+    "the relief valve opens."
 )
 _NO_RELIEF = " The model has no relief valves at the actuators."
 _HEADER = (

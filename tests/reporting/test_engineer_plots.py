@@ -174,7 +174,8 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     section = step_section(SETTINGS, summary)
     assert section is not None
     # from 3 to 3 / √2, between 0.5 and 1 Hz
-    assert section.answer == "bandwidth (-3 dB): shoulder 0.9 Hz"
+    answer = "in the slower direction: bandwidth (-3 dB): shoulder 0.9 Hz"
+    assert section.answer == answer
     (tab,) = section.tabs
     chart = tab.make()
     assert [(panel.log_x, panel.log_y) for panel in chart.panels] == [

@@ -182,8 +182,9 @@ class Ladder:
         """Refine on the first rung, and then with terms besides.
 
         Those of single joints come first: with the wrong curve of a valve, a pump that
-        is not there explains something. They are tried again where others were added,
-        and so are the others where that helped.
+        is not there explains something. Without the pump that is there, a curve does,
+        too: so where others were added, those of joints that were kept are tried
+        without, and the rest again. Where that helped, so are the others.
         """
         rung = whole.settings.rung
         self._step = Step("refined")
@@ -193,14 +194,13 @@ class Ladder:
         self._add_lone_terms(whole, lone, settings)
         of_joints = self._step.terms
         self._add_terms(whole, rung, lone, settings)
-        shared = self._step.terms
-        if shared == of_joints:
+        if self._step.terms == of_joints:
             return
         for term in of_joints:
-            # without a pump, a valve's curve explains something, too
             self._try_without(whole, term, settings)
+        with_shared = self._step.terms
         self._add_lone_terms(whole, lone, settings)
-        if self._step.terms != shared:
+        if self._step.terms != with_shared:
             self._add_terms(whole, rung, lone, settings)
 
     def _climb_model(

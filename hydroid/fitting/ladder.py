@@ -146,6 +146,7 @@ class Ladder:
         self._checkpoints = checkpoints
         self._late = False
         self._is_near = False
+        self._begun_anew: Step | None = None
         self._step = step_of(self.kept.name)
 
     def climb(self, whole: Problem) -> None:
@@ -192,6 +193,9 @@ class Ladder:
         if not (self._is_near and lone):
             self._rung(whole, self._step, settings, if_better=False)
         self._add_lone_terms(whole, lone, settings)
+        # what else the model needs shows where its errors are no larger than need be
+        if whole.settings.terms():
+            self._begin_anew(settings)
         of_joints = self._step.terms
         self._add_terms(whole, rung, lone, settings)
         if self._step.terms == of_joints:
@@ -245,8 +249,9 @@ class Ladder:
         right where the model errs, but not where errors last because parameters are
         held: an optimum, too, and least squares does not leave it.
         """
-        if self._late:
+        if self._late or self._begun_anew == self._step:
             return
+        self._begun_anew = self._step
         problem = self.problem
         likelihood = make_likelihood(problem)
         step = self._step.changed(start=ANEW, phase="on the way")

@@ -40,7 +40,9 @@ from hydroid.settings.search import RefinementSettings
 FIRST = 10
 """iterations after which another beginning must err less than the last one"""
 LESS = 0.1
-"""part by which the errors of one joint must fall for its model to be refined again"""
+"""part by which errors must fall for a model to be refined"""
+BENDS = 0.3
+"""the same for what a valve's curve promises: it bends to any errors a little"""
 ANEW = 3
 """number of the start from which the kept estimate is refined again"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
@@ -143,6 +145,8 @@ class Ladder:
         self._watch = watch
         self._checkpoints = checkpoints
         self._late = False
+        self._is_near = False
+        self._begun_anew: Step | None = None
         self._step = step_of(self.kept.name)
 
     def climb(self, whole: Problem) -> None:
@@ -158,6 +162,7 @@ class Ladder:
         if anew:
             tolerance = max(FIRM, refinement.gain_tolerance)
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
+        self._is_near = by_starts
         lone = self._lone_terms(settings)
         self._climb_first(whole, lone, on_the_way)
         for rung in further:
@@ -178,20 +183,28 @@ class Ladder:
         """Refine on the first rung, and then with terms besides.
 
         Those of single joints come first: with the wrong curve of a valve, a pump that
-        is not there explains something. They are tried again where others were added,
-        and so are the others where that helped.
+        is not there explains something. Without the pump that is there, a curve does,
+        too: so where others were added, those of joints that were kept are tried
+        without, and the rest again. Where that helped, so are the others.
         """
         rung = whole.settings.rung
-        # the first one is refined in any case
-        self._rung(whole, Step("refined"), settings, if_better=False)
+        self._step = Step("refined")
+        # joints that were searched alone have no need of the others yet
+        if not (self._is_near and lone):
+            self._rung(whole, self._step, settings, if_better=False)
         self._add_lone_terms(whole, lone, settings)
+        # what else the model needs shows where its errors are no larger than need be
+        if whole.settings.terms():
+            self._begin_anew(settings)
         of_joints = self._step.terms
         self._add_terms(whole, rung, lone, settings)
-        shared = self._step.terms
-        if shared == of_joints:
+        if self._step.terms == of_joints:
             return
+        for term in of_joints:
+            self._try_without(whole, term, settings)
+        with_shared = self._step.terms
         self._add_lone_terms(whole, lone, settings)
-        if self._step.terms != shared:
+        if self._step.terms != with_shared:
             self._add_terms(whole, rung, lone, settings)
 
     def _climb_model(
@@ -236,8 +249,9 @@ class Ladder:
         right where the model errs, but not where errors last because parameters are
         held: an optimum, too, and least squares does not leave it.
         """
-        if self._late:
+        if self._late or self._begun_anew == self._step:
             return
+        self._begun_anew = self._step
         problem = self.problem
         likelihood = make_likelihood(problem)
         step = self._step.changed(start=ANEW, phase="on the way")
@@ -326,7 +340,7 @@ class Ladder:
         far = False
         if theta is None:
             # what a search ended at may be far from an optimum
-            far = start.name not in self.refinements
+            far = start.name not in self.refinements and not self._is_near
             far |= bool(_new_curves(problem, last))
             theta = _begun(problem, last, start.theta)
             renewed = _renewed(problem, last, theta)
@@ -423,7 +437,9 @@ class Ladder:
                 step = tried.changed(joint=0)
             elif alone_with.without is not None:
                 theta = _likelier(problem, theta, alone_with.without)
-        if step != self._step:
+        if self.kept.name not in self.refinements:
+            self._rung(whole, step, settings, if_better=False, begun=theta)
+        elif step != self._step:
             self._rung(whole, step, settings, if_better=True, begun=theta)
         elif theta is not self.kept.theta:
             # a joint went on alone from where all together had ended
@@ -446,7 +462,8 @@ class Ladder:
         started = problem.parameters.started(values)
         new = np.array([name not in values for name in problem.settings.parameters])
         likelihood = make_likelihood(alone(problem, joint, started))
-        return promised(likelihood.of_independent_errors, started, new) > LESS
+        least = BENDS if _new_curves(problem, last) else LESS
+        return promised(likelihood.of_independent_errors, started, new) > least
 
     def _alone(
         self,

@@ -125,7 +125,11 @@ class Multistart:
             unit[0] = self._problem.start
         drawn = self._problem.theta(unit)
         shortest = self._parts(self._problem)[0]
-        return drawn[np.argmax(np.isfinite(shortest.output_errors(drawn)).all(axis=1))]
+        # as a rule it is the first one
+        for theta in drawn:
+            if np.isfinite(shortest.output_errors(theta[None])).all():
+                return theta
+        return drawn[0]
 
     def _joint_by_joint(self, number: int, theta: Array) -> Array:
         """Fit start `number`, (P,), to every joint alone; the last start takes the best

@@ -43,9 +43,14 @@ def make_plugin(
     The coil of an infeasible candidate has no force. `entries` say where M[i, j] stands
     in a row of MuJoCo's sparse mass matrix, shape (J, J).
     """
-    driven = joints.kind[0] != NONE
-    order = np.argsort(driven, stable=True)
     table = coefficients(joints, period, substeps).view(np.ndarray)
+    return plugin_of(table, entries, period, substeps)
+
+
+def plugin_of(table: Structs, entries: Index, period: float, substeps: int) -> Plugin:
+    """Return the same from what the kernel reads of them, of COEFFICIENTS, (n, J)."""
+    driven = table["kind"][0] != NONE
+    order = np.argsort(driven, stable=True)
     idle = int(np.sum(~driven))
     return Plugin(table, order, entries[np.ix_(order, order)], idle, period, substeps)
 
@@ -75,7 +80,7 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     where oil is trapped; both have the shape (n, J).
     """
     c = unpacked(plugin.coefficients)
-    lever = rod_motion(angle, c)[1]
+    travel, lever, _ = rod_motion(angle, c)
     stated = np.isfinite(c.start_pressure)
     level = np.where(stated, c.start_pressure, START_PRESSURE)
     pressure_a, pressure_b = holding_pressures(
@@ -84,7 +89,7 @@ def at_rest(plugin: Plugin, angle: Array, torque: Array) -> Structs:
     rests = np.isfinite(c.trapped_pressure) & (c.kind != NONE)
     pressure_a = np.where(rests, c.trapped_pressure, pressure_a)
     pressure_b = np.where(rests, level, pressure_b)
-    fill_a, fill_b = fills(angle, c)
+    fill_a, fill_b = fills(travel, c)
     state = np.zeros(plugin.coefficients.shape, JOINT_STATE)
     state["a"]["oil"] = pressure_a + c.bulk_modulus * fill_a
     state["b"]["oil"] = pressure_b + c.bulk_modulus * fill_b
@@ -117,7 +122,7 @@ def pressures(coefficients: Structs, state: Structs, angle: Array) -> Array:
     record.
     """
     c = unpacked(coefficients)
-    fill_a, fill_b = fills(angle, c)
+    fill_a, fill_b = fills(rod_motion(angle, c)[0], c)
     pressure_a = state["a"]["oil"] - c.bulk_modulus * fill_a
     pressure_b = state["b"]["oil"] - c.bulk_modulus * fill_b
     # less oil than the chamber's volume: it cavitates

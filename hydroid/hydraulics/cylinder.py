@@ -70,22 +70,32 @@ def rod_motion(angle: Array, c) -> list[Array]:
     Of a rotary actuator x is the angle, and r is 1, unless its moment arm is `bent`.
     """
     still = (angle, 1.0, 0.0)
-    has_rocker = c.rocker > 0
-    with np.errstate(all="ignore"):  # joints without a range, a rocker or a triangle
-        turned = bent(angle, c)
-        rocked = four_bar(angle, c)
-        psi = np.where(has_rocker, rocked[0], angle)
-        first = np.where(has_rocker, rocked[1], 1.0)
-        second = np.where(has_rocker, rocked[2], 0.0)
-        travel, arm, slope = triangle(
-            psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest
-        )
-        cylinder = (travel, arm * first, slope * first**2 + arm * second)
     kinds = [c.kind == LINEAR, c.kind == ROTARY]
+    is_linear, is_rotary = (bool(np.any(kind)) for kind in kinds)
+    with np.errstate(all="ignore"):  # joints without a range, a rocker or a triangle
+        cylinder = _rods(angle, c) if is_linear else still
+        turned = bent(angle, c) if is_rotary else still
     return [
         np.select(kinds, [linear, rotary], without)
         for linear, rotary, without in zip(cylinder, turned, still, strict=True)
     ]
+
+
+def _rods(angle: Array, c) -> tuple[Any, Any, Any]:
+    """Return the same of cylinders."""
+    has_rocker = c.rocker > 0
+    psi = angle
+    first = 1.0
+    second = 0.0
+    if np.any(has_rocker):
+        rocked = four_bar(angle, c)
+        psi = np.where(has_rocker, rocked[0], angle)
+        first = np.where(has_rocker, rocked[1], 1.0)
+        second = np.where(has_rocker, rocked[2], 0.0)
+    travel, arm, slope = triangle(
+        psi, c.pivot_distance_1, c.pivot_distance_2, c.theta0, c.shortest
+    )
+    return travel, arm * first, slope * first**2 + arm * second
 
 
 @compilable

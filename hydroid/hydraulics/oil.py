@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.hydraulics.cylinder import bent, rod, rod_motion, rod_way
+from hydroid.hydraulics.cylinder import bent, rod, rod_way
 from hydroid.hydraulics.elementwise import compilable, implicit_weight
 from hydroid.hydraulics.records import LINEAR, ROTARY
 
@@ -60,10 +60,9 @@ def filling(travel, area, dead) -> Any:
     return np.log(volume(travel, area, dead) / dead)
 
 
-def fills(angle: Array, c) -> list[Array]:
-    """ln(V/V_0) of chambers A and B at angles [rad] of COEFFICIENTS; ± D_m q/V_0 of a
-    rotary actuator."""
-    travel = rod_motion(angle, c)[0]
+def fills(travel: Array, c) -> list[Array]:
+    """ln(V/V_0) of chambers A and B of COEFFICIENTS at rods' travels [m]; ± D_m q/V_0
+    of a rotary actuator, which travels by its angle q [rad]."""
     linear = c.kind == LINEAR
     dead = c.dead_volume
     cylinder_a = filling(travel, c.a.area, dead)

@@ -46,7 +46,7 @@ class Bindings:
     def __init__(self, settings: FitSettings) -> None:
         self._arm = settings.arm
         self._stage = settings.stage
-        self._group_of = settings.log.group_of
+        self.group_of = settings.log.group_of
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
         bindings: list[Binding] = []
         for column, (name, parameter) in enumerate(settings.parameters.items()):
@@ -77,7 +77,10 @@ class Bindings:
     def candidates(self, theta: Array, log: str = "") -> Candidates:
         """Spread theta, shape (n, P), over joints and links, in SI, as they are in a
         log of this name."""
-        group = self._group_of(log)
+        return self.of_group(theta, self.group_of(log))
+
+    def of_group(self, theta: Array, group: str) -> Candidates:
+        """Return the same as they are in the logs of a group."""
         # what no parameter sets keeps its nominal value
         joints = np.tile(self._nominal, (len(theta), 1))
         mass = np.tile(self._arm.masses, (len(theta), 1))

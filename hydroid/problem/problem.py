@@ -25,7 +25,7 @@ from hydroid.problem.channels import (
 )
 from hydroid.problem.priors import Priors
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation import Response, Simulation, make_simulation
+from hydroid.simulation import Candidates, Response, Simulation, make_simulation
 from hydroid.simulation.roles import roles
 
 CHUNK = 2**23  # residuals that are held in memory at a time, 64 MiB
@@ -79,6 +79,7 @@ class Problem:
             pressures = compared_pressures(log, settings)
             simulation = make_simulation(spec, log, outputs, settings, pressures)
             self._simulations.append(simulation)
+        self._groups = [self.bindings.group_of(log.source) for log in logs]
         self.channels = make_channels(logs, settings)
         self.measured = np.concatenate([c.weight * c.measured for c in self.channels])
         segments: list[Ints] = []
@@ -202,9 +203,11 @@ class Problem:
         if key in self._tried:
             return self._tried[key]
         responses: list[Response] = []
-        for simulation, log in zip(self._simulations, self.logs, strict=True):
-            candidates = self.bindings.candidates(theta, log.source)
-            responses.append(simulation.simulate(candidates))
+        of_group = dict[str, Candidates]()
+        for simulation, group in zip(self._simulations, self._groups, strict=True):
+            if group not in of_group:
+                of_group[group] = self.bindings.of_group(theta, group)
+            responses.append(simulation.simulate(of_group[group]))
         if len(theta) <= TRIED:
             for i, row in enumerate(theta):
                 self._tried[row.tobytes()] = [one[i : i + 1] for one in responses]

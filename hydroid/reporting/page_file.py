@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from hydroid.arrays import Array
 from hydroid.files import fill_template, write_atomic
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.page import Page, Table, short_name
@@ -80,17 +81,19 @@ def plain(drawn: Any) -> Any:
         case Chart():
             return vars(drawn.thinned())
         case np.ndarray() if drawn.ndim == 1:
-            return [_five_digits(value) for value in drawn.tolist()]
+            return _five_digits(drawn)
         case np.ndarray():
             return list(drawn)
         case _:
             return vars(drawn)
 
 
-def _five_digits(value: float) -> float | None:
-    if math.isfinite(value):
-        return float(f"{value:.5g}")
-    return None
+def _five_digits(values: Array) -> list[float | None]:
+    """Return numbers, (n,), that print with five digits; None for what is not finite."""
+    # all are printed at once: a page holds hundreds of thousands
+    printed = ("%.5g " * len(values)) % tuple(values.tolist())
+    numbers = map(float, printed.split())
+    return [one if math.isfinite(one) else None for one in numbers]
 
 
 def html(page: Page) -> str:

@@ -2,8 +2,9 @@
 command to torque."""
 
 from copy import copy
-from dataclasses import replace
-from typing import Any
+from dataclasses import field, replace
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.signal import butter, sosfiltfilt
 from hydroid.arm.locked import LockedArm, lock
 from hydroid.arrays import Array, Index, Structs, record
 from hydroid.errors import SettingsError
-from hydroid.hydraulics.actuator import at_rest, make_plugin, swallowed
+from hydroid.hydraulics.actuator import at_rest, plugin_of, swallowed
 from hydroid.hydraulics.kernel import Plugin
 from hydroid.hydraulics.records import NONE, Records, coefficients
 from hydroid.log import Log
@@ -98,6 +99,18 @@ def smooth(angle: Array, cutoff: float) -> Array:
     return sosfiltfilt(low_pass, angle, axis=0, padlen=padding)
 
 
+class Layout(NamedTuple):
+    """How a kernel steps the joints of an arm.
+
+    joints: 0-based. idle: which of these no actuator drives. period: of a step [s].
+    """
+
+    joints: tuple[int, ...]
+    idle: tuple[bool, ...]
+    period: float
+    substeps: int
+
+
 @record
 class Candidates:
     """Physical values of n candidates, joints and links in the arm's order.
@@ -108,12 +121,33 @@ class Candidates:
 
     joints: Records
     mass: Array
+    _laid_out: dict[Layout, Structs] = field(
+        default_factory=dict[Layout, Structs], init=False, repr=False
+    )
 
     def __len__(self) -> int:
         return len(self.mass)
 
     def __getitem__(self, rows: slice | Index) -> "Candidates":
         return Candidates(self.joints[rows], self.mass[rows])  # pyright: ignore[reportArgumentType]
+
+    @cached_property
+    def each_once(self) -> tuple["Candidates", Index]:
+        """The candidates that differ, and which of these each one is, shape (n,)."""
+        first, alike = distinct(self.joints, self.mass)
+        if len(first) == len(self):
+            return self, np.arange(len(self))
+        return self[first], alike
+
+    def laid_out(self, layout: Layout) -> Structs:
+        """Return what the kernel reads of some joints, of COEFFICIENTS, (n, J): the
+        same for all logs, and worked out once."""
+        if layout not in self._laid_out:
+            joints: Records = self.joints[:, np.array(layout.joints, np.intp)]  # pyright: ignore[reportAssignmentType]
+            joints.kind[:, np.array(layout.idle, np.bool_)] = NONE
+            table = coefficients(joints, layout.period, layout.substeps)
+            self._laid_out[layout] = table.view(np.ndarray)
+        return self._laid_out[layout]
 
 
 def distinct(*tables: Any) -> tuple[Index, Index]:
@@ -288,7 +322,6 @@ class Chain:
         self._pushed = moving[self.pushed]
         self._stepping = stepping
         active = roles.active
-        self._idle = ~active[self.joints]
         for joint in self.joints[active[self.joints]].tolist():
             if arm.joints[joint].actuator is None:
                 raise SettingsError(
@@ -308,7 +341,13 @@ class Chain:
         # MuJoCo stores one half of the symmetric matrix
         entries[columns, rows] = np.arange(model.nC)
         self._entries = entries[np.ix_(self.columns, self.columns)]
-        self._period = model.opt.timestep
+        self._layout = Layout(
+            joints=tuple(self.joints.tolist()),
+            idle=tuple((~active[self.joints]).tolist()),
+            period=model.opt.timestep,
+            substeps=stepping.substeps,
+        )
+        self._swallowed = (b"", np.empty((0, 0)))
         self._links = NO_LINKS
         if stepping.rung.at_once:
             self._links = make_links(model)
@@ -334,16 +373,15 @@ class Chain:
         where there are none, are taken by candidates that have no start pressure of
         their own.
         """
-        joints: Records = candidates.joints[:, self.joints]  # pyright: ignore[reportAssignmentType]
+        table = candidates.laid_out(self._layout).copy()
         away = abs(self._range - pose[self.columns])
         to_stop = np.min(away, axis=0)
         # nothing is trapped at a stop that the joint does not touch
-        joints.trapped_pressure[:, to_stop > STOP_REACH] = np.inf
+        table["trapped_pressure"][:, to_stop > STOP_REACH] = np.inf
         if pressure is not None:
-            _take_measured(joints, pressure[self.columns])
-        joints.kind[:, self._idle] = NONE
-        substeps = self._stepping.substeps
-        plugin = make_plugin(joints, self._entries, self._period, substeps)
+            _take_measured(table, pressure[self.columns])
+        layout = self._layout
+        plugin = plugin_of(table, self._entries, layout.period, layout.substeps)
         angle = np.tile(pose[self.columns], (len(balance), 1))
         return plugin, at_rest(plugin, angle, balance[:, self.columns])
 
@@ -353,19 +391,27 @@ class Chain:
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
             return np.empty((len(candidates), 0))
-        first, alike = distinct(joints)  # mostly held, so that they are alike
-        some: Records = coefficients(joints[first])[:, None]  # pyright: ignore
-        flow = swallowed(some, motion.angle, motion.velocity).sum(axis=2)
-        return flow[alike]
+        # held, as a rule: so they are alike, and as they were the last time
+        first, alike = distinct(joints)
+        key = joints[first].tobytes()
+        taken = self._swallowed
+        if taken[0] != key:
+            some: Records = coefficients(joints[first])[:, None]  # pyright: ignore
+            flow = swallowed(some, motion.angle, motion.velocity).sum(axis=2)
+            taken = (key, flow)
+            self._swallowed = taken
+        return taken[1][alike]
 
 
-def _take_measured(joints: Records, pressure: Array) -> None:
-    """Let candidates' joints, (n, J), start with measured pressures of chambers A and B
+def _take_measured(table: Structs, pressure: Array) -> None:
+    """Let candidates' joints, (n, J) of COEFFICIENTS, start with measured pressures of chambers A and B
     [Pa], (J, 2), where they have none of their own."""
     pressure_a, pressure_b = pressure.T
     measured = np.isfinite(pressure).all(axis=1)
-    asked = np.isinf(joints.start_pressure) & measured
-    rests = asked & np.isfinite(joints.trapped_pressure)
+    trapped = table["trapped_pressure"]
+    start = table["start_pressure"]
+    asked = np.isinf(start) & measured
+    rests = asked & np.isfinite(trapped)
     # balance gives the pressure of A, but at a stop, which may carry a part of the load
-    joints["trapped_pressure"] = np.where(rests, pressure_a, joints.trapped_pressure)
-    joints["start_pressure"] = np.where(asked, pressure_b, joints.start_pressure)
+    table["trapped_pressure"] = np.where(rests, pressure_a, trapped)
+    table["start_pressure"] = np.where(asked, pressure_b, start)

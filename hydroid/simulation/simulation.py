@@ -105,6 +105,8 @@ class Simulation:
         self.joints = self._chain.joints
         # single arms that former candidates left
         self._free = deque[SteppedArm]()
+        # in the last balance: of what values, and the torques [N·m]
+        self._held = (b"", np.empty((0, 0)))
         self._pressures = np.searchsorted(self.joints, np.array(pressures, int))
 
     def simulate(self, candidates: Candidates) -> Response:
@@ -114,6 +116,10 @@ class Simulation:
         The first is the start. One without a force-stroke curve, or that diverged, has
         NaN throughout.
         """
+        # those that differ only in effects of other groups of logs are simulated once
+        differing, alike = candidates.each_once
+        if len(differing) < len(candidates):
+            return self.simulate(differing)[alike]
         scenario = self.scenario
         n = len(candidates)
         samples = 1 + len(scenario.command) // scenario.stepping.steps
@@ -124,17 +130,14 @@ class Simulation:
             flow=np.full((n, samples, wanted, 2), np.nan),
             line=np.full((n, samples if wanted else 0), np.nan),
         )
-        # those that differ only in effects of other groups of logs are simulated once
-        first, alike = distinct(candidates.joints, candidates.mass)
         # a coil that no numbers give a force is infeasible, and costs no simulation
         exists = has_force_curve(candidates.joints[:, self.joints])
-        rows = np.intersect1d(np.flatnonzero(exists), first)
+        rows = np.flatnonzero(exists)
         threads = min(scenario.settings.threads or os.cpu_count() or 1, rows.size)
         if not threads:
             return response
-        self._fill(response, rows, candidates[rows], threads)
-        if len(first) < n:
-            return response[first[alike]]
+        able = candidates if rows.size == n else candidates[rows]
+        self._fill(response, rows, able, threads)
         return response
 
     def _fill(
@@ -246,7 +249,7 @@ class Simulation:
         n = len(candidates)
         values = scenario.values(candidates)
         pose = scenario.arm.pose
-        balance = _balance(arm, values, pose)
+        balance = self._balance(arm, values, pose)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
         before = np.zeros((plugin.past, len(chain.columns)))
         commands = np.concatenate([before, scenario.command[:, chain.columns]])
@@ -265,6 +268,28 @@ class Simulation:
             taken=chain.taken(candidates, scenario.prescribed),
             openings=openings,
         )
+
+    def _balance(self, arm: SteppedArm, values: dict[str, Array], pose: Array) -> Array:
+        """Return what holds n candidates, of `values`, in a pose, (V,) [N·m], shape (n,
+        V).
+
+        As a rule they are alike, and as they were the last time: valves weigh nothing.
+        """
+        # at rest neither dampers nor friction act
+        at_rest = [value for name, value in values.items() if name not in OF_MOTION]
+        first, alike = distinct(*at_rest)
+        key = b"".join(value[first].tobytes() for value in at_rest)
+        held = self._held
+        if held[0] != key:
+            torques = list[Array]()
+            for begin in range(0, len(first), arm.copies):
+                # the last group is filled with candidates that are there twice
+                some = np.resize(first[begin:], arm.copies)
+                start = np.tile(pose, arm.copies)
+                torques.append(arm.start(values, some, start))
+            held = (key, np.concatenate(torques).reshape(-1, len(pose)))
+            self._held = held
+        return held[1][alike]
 
     def _follow(
         self, ready: "_Ready", arm: SteppedArm, some: Index
@@ -371,22 +396,6 @@ def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
     if np.isinf(coefficients["pump_flow"][last]):
         line[:] = np.nan
     return Oil(pressures(coefficients, history, angle), flow, line)
-
-
-def _balance(arm: SteppedArm, values: dict[str, Array], pose: Array) -> Array:
-    """Return what holds n candidates, of `values`, in a pose, (V,) [N·m], shape (n,
-    V)."""
-    # at rest neither dampers nor friction act
-    at_rest = [value for name, value in values.items() if name not in OF_MOTION]
-    first, alike = distinct(*at_rest)
-    held: list[Array] = []
-    for begin in range(0, len(first), arm.copies):
-        # the last group is filled with candidates that are there twice
-        some = np.resize(first[begin:], arm.copies)
-        start = np.tile(pose, arm.copies)
-        held.append(arm.start(values, some, start))
-    balances = np.concatenate(held).reshape(-1, len(pose))
-    return balances[alike]
 
 
 def reading(angle: Array, sensors: Structs, period: float) -> Array:

@@ -103,6 +103,44 @@ def test_a_joint_refinement_keeps_a_term_that_is_called_as_its_model():
     assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)
 
 
+OF_JOINTS = {
+    **{
+        f"open_{j}": {"quantity": "opening", "joints": [j], "nominal": 0.3, "within": 2}
+        for j in (2, 3)
+    },
+    "bend": {"quantity": "curve", "joints": [2], "term": "curve_shoulder"},
+    "P_flow": CONFIG["P_flow"],
+    "P_droop": CONFIG["P_droop"],
+}
+MACHINES = {
+    "refined": {},
+    "refined+curve_shoulder": {f"bend_{part}": 0.1 for part in range(1, 4)}
+    | {"bend_4": 1.0},
+    "refined+pump": {"P_droop": 120.0},
+}
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_curve_and_a_pump_do_not_stand_in_for_each_other(name):
+    """Where joints share a pump, a valve's curve explains a part of what the pump does,
+    until the pump is there."""
+    changes = {
+        "outputs": (2, 3),
+        "simulation.model": "quasi-static",
+        "search.algorithm": "multistart",
+        "search.multistart": MultistartSettings(starts=1, horizons=()),
+        "refinement": RefinementSettings(iterations=40),
+    }
+    ladder = settings_of(OF_JOINTS).changed(changes)
+    machine = ladder.of_estimate(name)
+    truth = {"open_2": 0.35, "open_3": 0.3, "P_flow": 3.0} | MACHINES[name]
+    known = {one: value for one, value in truth.items() if one in machine.parameters}
+    log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
+    exact = simulate_log(machine, log, known)
+    found = fit(Problem(ladder, [noisy(exact, 0.02, 1, exact_start=False)]))
+    assert found.final == name
+
+
 class Hurried(Silent):
     """Says that time is up after so many calls."""
 

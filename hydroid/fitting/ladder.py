@@ -39,6 +39,8 @@ from hydroid.settings.search import RefinementSettings
 
 FIRST = 10
 """iterations after which another beginning must err less than the last one"""
+SECONDS = 20.0
+"""of each log, over which another model is first tried [s]"""
 LESS = 0.1
 """part by which errors must fall for a model to be refined"""
 BENDS = 0.3
@@ -349,7 +351,7 @@ class Ladder:
             if self._is_white():
                 return None
             far = True
-            theta = self._nearer(make_likelihood(problem), theta, settings, step)
+            theta = self._nearer(problem, theta, settings, step)
             if problem.rms(problem.output_errors(theta[None]))[0] > start.rms:
                 return None
         return _Beginning(theta, far)
@@ -377,7 +379,7 @@ class Ladder:
 
     def _nearer(
         self,
-        likelihood: Likelihood,
+        problem: Problem,
         theta: Array,
         settings: RefinementSettings,
         step: Step,
@@ -387,11 +389,16 @@ class Ladder:
 
         What stood for oil and inertia in the last model, a lag or a dead band, may lie
         behind a hill: so the start is tried where the last model leads to larger
-        errors. Both are refined a little by output errors: innovations still have the
-        drift of the last model's errors.
+        errors. Both are refined a little by output errors, over the first seconds of
+        the logs: innovations still have the drift of the last model's errors, and the
+        other model is slow.
         """
         few = settings.changed({"iterations": FIRST})
-        problem = likelihood.problem
+        parts = [log.first(SECONDS) for log in problem.logs]
+        last = self.problem.varied(self.problem.settings, parts)
+        (rms,) = last.rms(last.output_errors(self.kept.theta[None]))
+        problem = problem.varied(problem.settings, parts)
+        likelihood = make_likelihood(problem)
         parameters = problem.parameters
         ends = list[Refinement]()
         for number, begun in enumerate((theta, parameters.start)):
@@ -399,7 +406,7 @@ class Ladder:
             end = self._refined(likelihood.of_output_errors, begun, few, at_first)
             ends.append(end)
             errors = problem.output_errors(parameters.from_unit(end.point[None]))
-            if problem.rms(errors)[0] <= self.kept.rms:
+            if problem.rms(errors)[0] <= rms:
                 break
         return parameters.from_unit(min(ends, key=lambda end: end.negative_log).point)
 

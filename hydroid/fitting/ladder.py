@@ -437,7 +437,8 @@ class Ladder:
             own = whole.varied(whole.settings.of_estimate(tried.estimate))
             if not self._promises(own, problem, theta, joint):
                 continue
-            alone_with = self._alone(problem, own, theta, tried, settings)
+            among = len(lone)
+            alone_with = self._alone(problem, own, theta, tried, settings, among)
             if alone_with.theta is not None:
                 problem = own
                 theta = alone_with.theta
@@ -479,11 +480,13 @@ class Ladder:
         theta: Array,
         step: Step,
         settings: RefinementSettings,
+        among: int,
     ) -> "_Alone":
         """Refine a joint alone without the last term of a step, and with it, from the
         theta of the last problem, (P,).
 
-        Both begin where independent output errors lead: else what helped the one would
+        It is one `among` the terms of joints, of which some seem better by chance. Both
+        begin where independent output errors lead: else what helped the one would
         count for the term. If these hardly fall with it, it is not refined any further.
         """
         before = alone(last, step.joint, theta)
@@ -499,7 +502,9 @@ class Ladder:
         if self._late:
             return _Alone()
         if with_it is not None and is_better(
-            self._left_out_of(after, with_it), self._left_out_of(before, without)
+            self._left_out_of(after, with_it),
+            self._left_out_of(before, without),
+            among,
         ):
             return _Alone(theta=after.parameters.from_unit(with_it.point))
         return _Alone(without=before.parameters.from_unit(without.point))

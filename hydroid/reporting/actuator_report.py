@@ -61,7 +61,7 @@ TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
 
 _SPEED = (
     "Dead band: up to this command the valve stays shut; at 0 % the smallest command opens it. "
-    "Fixed: the fit does not estimate it. "
+    "One that is called fixed is not estimated by the fit. "
     "Lines: the model's steady speed at mid travel, with the sign of the angle, and the opening "
     "of the valve. Bands: 95 % confidence intervals. Points: measured speeds, in any pose and "
     "under any load, against the command one dead time earlier. Grey: commands that the logs do "
@@ -90,9 +90,9 @@ _TABLE = (
     f"{100 * STEADY:.0f} % at most, and within {2 * OVER:g} s the command changed by {STILL:g} % at most."
 )
 _RESPONSES = (
-    "In brackets: 95 % intervals. Settling time: from the step until the speed stays within "
-    f"{100 * SETTLED:.0f} % of what it is {TIME_CONSTANTS:g} time constants after the dead time, "
-    f"or {LEAST_START:g} s after the step if that is later; over: it does not until then. Phase: "
+    "In brackets: 95 % intervals. Settling time: after it, the speed stays within "
+    f"{100 * SETTLED:.0f} % of its value {TIME_CONSTANTS:g} time constants after the dead time (or "
+    f"{LEAST_START:g} s after the step, if that is later). Over: by then it has not settled. Phase: "
     "of the speed behind the command."
 )
 
@@ -133,7 +133,9 @@ def speed_section(
     title = "Speed against command"
     text = _SPEED_ALONE
     fastest = [*filter(None, fastest)]
-    answer = f"speed at the largest commands of the logs: {'; '.join(fastest)}"
+    answer = (
+        f"the model's speed at the largest commands of the logs: {'; '.join(fastest)}"
+    )
     if shut:
         title = "Valve: dead band, opening, and speed against command"
         text = _SPEED + _pump_words(settings, summary)
@@ -177,8 +179,8 @@ def _pulled(
     if not said:
         return ""
     return (
-        f" From {listed(said)} on, the load pulls the joint faster than the pump fills its chamber, "
-        "which grows by more than the pump gives."
+        f" From {listed(said)} on, the load pulls the joint: its chamber grows faster than the pump "
+        "can fill it."
     )
 
 

@@ -43,9 +43,9 @@ _SURE = (
 )
 _ERRORS = (
     "Expected: rms error of how far a joint moves in this time, if parameters and model were "
-    "exact. It has the sensor's noise, at both ends, and what the fitted logs show of other "
-    "influences, at the mean speed there. An error that persists comes from the model, not from "
-    "the sensor. Empty: none persists."
+    "exact. It contains the sensor's noise, at the start and at the end of this time, and the other "
+    "influences that the fitted logs show at the joint's mean speed. An error that persists comes "
+    "from the model, not from the sensor. Empty: none persists."
 )
 _MEASURED_ERRORS = (
     " Measured: the same on the unseen logs, as in the table of verdicts. It is larger "

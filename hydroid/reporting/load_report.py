@@ -100,7 +100,7 @@ def _answer(
             leaks.setdefault(leakage(settings, summary, one.joint), []).append(name)
     answers = list[str]()
     if slower:
-        answers.append(f"speed under twice the load: {'; '.join(slower)}")
+        answers.append(f"speeds if the load of gravity doubles: {'; '.join(slower)}")
     for words, names in leaks.items():
         of = f" of {', '.join(names)}" if len(leaks) > 1 else ""
         answers.append(f"leakage{of}: {words}")

@@ -49,8 +49,9 @@ HEADER = (
 _TEXT = (
     "What the fitted logs, resampled every {period:g} s, cover of each joint. Beyond it the model "
     "extrapolates. Positions are "
-    f"angles, or the way of a joint that slides. Commands are those that the logs give for {HELD:g} s "
-    f"in all. Speeds are means over {OVER:g} s. Driven: time with positive and with negative commands."
+    f"angles, or the way of a joint that slides. Commands are those that the logs give for at least "
+    f"{HELD:g} s in total. Speeds are means over {OVER:g} s. Driven: time with positive and with "
+    "negative commands."
 )
 
 
@@ -145,7 +146,9 @@ def validity_section(run: FinishedRun) -> Section:
     logs = [prediction.log for prediction in run.result.fitted]
     joints = [covered(settings, logs, joint) for joint in settings.outputs]
     lacks = [*_lacks_of_joints(joints), *_lacks_of_logs(run, logs)]
-    valid = [f"{one.joint} {_commands(one)} %, {_positions(one)}" for one in joints]
+    valid = [
+        f"{one.joint} {_valid_commands(one)} %, {_positions(one)}" for one in joints
+    ]
     answer = f"valid for {listed(valid)}"
     if lacks:
         answer += f"; log next: {listed([one.what for one in lacks])}"
@@ -210,7 +213,7 @@ def _lacks_of_logs(run: FinishedRun, logs: Sequence[Log]) -> Iterator[Lack]:
         why = f"There {'is' if unseen == 1 else 'are'} {unseen or 'none'}."
         yield Lack("more unseen logs", f", {LEAST_BLOCKS} in all, to validate on", why)
     if not run.settings.payloads:
-        why = "No log has a payload: what one does, the model alone says."
+        why = "No log has a payload: its effect is known from the model alone."
         yield Lack("a known load", " at the tip, if the machine is to carry any", why)
 
 
@@ -230,6 +233,19 @@ def _is_fast(one: Covered) -> bool:
 def _commands(one: Covered) -> str:
     low, high = one.ends[0]
     return f"{_signed(low)} to {_signed(high)}"
+
+
+def _valid_commands(one: Covered) -> str:
+    """Write the commands that the logs cover: in two parts, if they leave out small
+    ones."""
+    if len(one.smallest) < len(SIGNS) or max(one.smallest.values()) <= SMALL:
+        return _commands(one)
+    low, high = one.ends[0]
+    parts = [
+        f"{_signed(low)} to {_signed(-one.smallest[-1.0])}",
+        f"{_signed(one.smallest[1.0])} to {_signed(high)}",
+    ]
+    return " and ".join(parts)
 
 
 def _least(one: Covered) -> str:

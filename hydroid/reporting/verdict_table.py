@@ -36,8 +36,8 @@ _TESTED = (
     "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: after predicting 1, "
     "5 and 10 s ahead, and over whole logs. In brackets: the error of the best simple "
     "model. Better, worse: than that model. Cannot be told: the difference may be chance; "
-    "more logs would show which model errs less. Good up to: the tolerance of errors over "
-    "whole logs, by default 2 % of travel."
+    "more logs would show which model errs less. Good up to: the error over whole logs that "
+    "is allowed, by default 2 % of travel."
 )
 _RULES = {
     Verdict.PREDICTS: "within the tolerance over whole logs",
@@ -46,7 +46,7 @@ _RULES = {
     Verdict.WORSE_THAN_FITTED: "over whole logs, errs more than twice as much on unseen as on fitted ones",
     Verdict.LITTLE: "errs by more than half of what standing still does",
     Verdict.UNTOLD: "after 1, 5 and 10 s neither better nor worse than this simple model",
-    Verdict.ROUGHLY: "none of the others; after 1, 5 or 10 s better than each simple model",
+    Verdict.ROUGHLY: "no other rule holds, and after 1, 5 or 10 s it is better than each simple model",
 }
 """when a joint has a verdict, the rule that is asked first in front"""
 _NO_WORD = f" Whole logs are compared from {LEAST_BLOCKS} logs on."
@@ -241,9 +241,9 @@ def horizon_section(fits: Verdicts) -> Section | None:
     names = ("joint", "of", "unit", *map(column_of, HORIZONS), WHOLE)
     columns = {name: name for name in names}
     note = (
-        "Rms error of how far the joint moves in this time, over starts every 2 s along the "
-        "unseen logs. Each simulation begins 2 s earlier, at the measured angles. Last "
-        "column: error of the angle over whole logs."
+        "How far the joint moves in this time: the rms error, over starts every 2 s along "
+        "the unseen logs. A simulation begins at the measured angles, 2 s before its start. "
+        "Last column: error of the angle over whole logs."
     )
     table = Table.of("Error by prediction time", columns, rows, note)
     if not rows:
@@ -375,9 +375,12 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
     where = "Furthest outside its tolerance"
     if _size(verdict) <= 1.0:
         where = "Nearest to its tolerance"
+    errs = "The best simple model errs by"
+    if simple < _error(verdict):
+        errs = "A simple model errs by less:"
     return (
         f"{where}: {verdict.name}, {error} {unit} (allowed {tolerance}, by default 2 % of "
-        f"travel). The best simple model errs by {least} {unit}."
+        f"travel). {errs} {least} {unit}."
     )
 
 

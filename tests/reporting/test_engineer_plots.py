@@ -99,7 +99,7 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
             )
         ]
         said.append(f"{name} {', '.join(tops)}")
-    start = "speed at the largest commands of the logs: "
+    start = "the model's speed at the largest commands of the logs: "
     assert section.answer == start + "; ".join(said)
     chart = section.tabs[0].make()
     labels = {mark.label for panel in chart.panels for mark in panel.marks}
@@ -137,7 +137,7 @@ def test_the_valve_s_dead_bands_stand_beside_its_heading():
     section = speed_section(settings, summary, PROBLEM.logs)
     assert section is not None
     assert section.title.startswith("Valve: dead band")
-    said = "dead band: shoulder +12 and −8.5 % and elbow +0 and −5 % (fixed); speed"
+    said = "dead band: shoulder +12 and −8.5 % and elbow +0 and −5 % (fixed); the model's speed"
     assert section.answer.startswith(said)
     stated = SUMMARY.quantities["shoulder_dead_band"].changed({"value": 15.0})
     quantities = {"shoulder_dead_band_positive": stated}

@@ -251,7 +251,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "whole fitted logs": "1",
         "good up to": "1",
     }
-    assert "Good up to: the tolerance" in table.note
+    assert "Good up to: the error" in table.note
     # the page also says by which rule; of the verdicts that it shows alone
     section = verdict_sections({"a": [one]})[0]
     note = section.tables["verdict"].note

@@ -293,36 +293,21 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
 
     None: the fit states none.
     """
+    names = [
+        settings.arm.name_of(joint)
+        for joint in settings.outputs
+        if _steps(settings.arm.name_of(joint), summary)
+    ]
+    if not names:
+        return None
     tabs = list[Plot]()
-    slowest = list[str]()
-    narrowest = list[str]()
-    settled = list[str]()
     rows = list[tuple[Cell, ...]]()
-    for joint in settings.outputs:
-        name = settings.arm.name_of(joint)
-        if not any(f"{name}_step_{towards}" in summary.curves for towards in TOWARDS):
-            continue
+    for name in names:
         draw = partial(_response_chart, name, summary.curves)
         caption = f"{name}: step and frequency response"
         tabs.append(Plot(f"step_{len(tabs) + 1}", caption, draw, button=name))
-        if dead_times := _dead_times(name, summary):
-            slowest.append(f"{name} {two_digits(max(dead_times))} s")
-        if times := _settling_times(name, summary):
-            settled.append(f"{name} {max(times)} s")
-        if widths := _bandwidths(name, summary.curves):
-            narrowest.append(f"{name} {two_digits(min(widths))} Hz")
-        for towards in TOWARDS:
-            if f"{name}_step_{towards}" in summary.curves:
-                rows.append(response_rows(name, towards, summary))
-    if not tabs:
-        return None
-    answers = list[str]()
-    if slowest:
-        answers.append(f"dead time: {listed(slowest)}")
-    if narrowest:
-        answers.append(f"bandwidth (-3 dB): {listed(narrowest)}")
-    if settled:
-        answers.append(f"settling time ({100 * SETTLED:.0f} %): {listed(settled)}")
+        for towards in _steps(name, summary):
+            rows.append(response_rows(name, towards, summary))
     title = "Step and frequency response"
     text = _STEP.format(rate=1.0 / settings.log.period_s)
     # the oil of the dynamic model is a spring by itself
@@ -336,8 +321,35 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
         tabs=tuple(tabs),
         tables=tables,
         folded=True,
-        answer=f"in the slower direction: {'; '.join(answers)}" if answers else "",
+        answer=_slower(names, summary),
     )
+
+
+def _steps(name: str, summary: FitSummary) -> list[str]:
+    """Return the directions in which a fit states the step response of a joint."""
+    return [one for one in TOWARDS if f"{name}_step_{one}" in summary.curves]
+
+
+def _slower(names: Sequence[str], summary: FitSummary) -> str:
+    """Say how late and how slow joints are, each in its slower direction; nothing where
+    the fit does not state it."""
+    late = list[str]()
+    narrow = list[str]()
+    settled = list[str]()
+    for name in names:
+        if dead_times := _dead_times(name, summary):
+            late.append(f"{name} {two_digits(max(dead_times))} s")
+        if widths := _bandwidths(name, summary.curves):
+            narrow.append(f"{name} {two_digits(min(widths))} Hz")
+        if times := _settling_times(name, summary):
+            settled.append(f"{name} {max(times)} s")
+    answers = {
+        "dead time": late,
+        "bandwidth (-3 dB)": narrow,
+        f"settling time ({100 * SETTLED:.0f} %)": settled,
+    }
+    said = [f"{what}: {listed(of)}" for what, of in answers.items() if of]
+    return f"in the slower direction: {'; '.join(said)}" if said else ""
 
 
 def _bandwidths(name: str, curves: Mapping[str, CurveEstimate]) -> list[float]:

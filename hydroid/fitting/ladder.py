@@ -147,7 +147,6 @@ class Ladder:
         self._watch = watch
         self._checkpoints = checkpoints
         self._late = False
-        self._is_near = False
         self._begun_anew: Step | None = None
         self._step = step_of(self.kept.name)
 
@@ -164,9 +163,8 @@ class Ladder:
         if anew:
             tolerance = max(FIRM, refinement.gain_tolerance)
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
-        self._is_near = by_starts
         lone = self._lone_terms(settings)
-        self._climb_first(whole, lone, on_the_way)
+        self._climb_first(whole, lone, on_the_way, alone_first=by_starts and bool(lone))
         for rung in further:
             self._climb_model(whole, rung, lone, on_the_way)
         if self._step.model in {rung.name for rung in further}:
@@ -180,7 +178,12 @@ class Ladder:
             self._rung(whole, joint, refinement, if_better=False)
 
     def _climb_first(
-        self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings
+        self,
+        whole: Problem,
+        lone: Mapping[str, int],
+        settings: RefinementSettings,
+        *,
+        alone_first: bool,
     ) -> None:
         """Refine on the first rung, and then with terms besides.
 
@@ -192,7 +195,7 @@ class Ladder:
         rung = whole.settings.rung
         self._step = Step("refined")
         # joints that were searched alone have no need of the others yet
-        if not (self._is_near and lone):
+        if not alone_first:
             self._rung(whole, self._step, settings, if_better=False)
         self._add_lone_terms(whole, lone, settings)
         # what else the model needs shows where its errors are no larger than need be
@@ -342,7 +345,7 @@ class Ladder:
         far = False
         if theta is None:
             # what a search ended at may be far from an optimum
-            far = start.name not in self.refinements and not self._is_near
+            far = start.name not in self.refinements
             far |= bool(_new_curves(problem, last))
             theta = _begun(problem, last, start.theta)
             renewed = _renewed(problem, last, theta)

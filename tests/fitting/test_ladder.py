@@ -28,6 +28,13 @@ CONFIG = {
     },
 }
 JOINT = {"simulation.model": "quasi-static", "joint_refinement": True}
+CHANGES = {
+    "outputs": (2, 3),
+    "simulation.model": "ladder",
+    "search.algorithm": "multistart",
+    "search.multistart": MultistartSettings(starts=1, horizons=()),
+    "refinement": RefinementSettings(iterations=40),
+}
 
 
 def _problem(name, term="pump", **more):
@@ -35,14 +42,7 @@ def _problem(name, term="pump", **more):
     rows = {
         n: row | {"term": term} if "term" in row else row for n, row in CONFIG.items()
     }
-    changes = {
-        "outputs": (2, 3),
-        "simulation.model": "ladder",
-        "search.algorithm": "multistart",
-        "search.multistart": MultistartSettings(starts=1, horizons=()),
-        "refinement": RefinementSettings(iterations=40),
-    }
-    ladder = settings_of(rows, bulk_modulus=20.0).changed(changes | more)
+    ladder = settings_of(rows, bulk_modulus=20.0).changed(CHANGES | more)
     machine = ladder.of_estimate(name)
     log = step_log(machine.arm.pose("study"), {2: SHOULDER, 3: ELBOW})
     exact = simulate_log(
@@ -124,14 +124,8 @@ MACHINES = {
 def test_a_curve_and_a_pump_do_not_stand_in_for_each_other(name):
     """Where joints share a pump, a valve's curve explains a part of what the pump does,
     until the pump is there."""
-    changes = {
-        "outputs": (2, 3),
-        "simulation.model": "quasi-static",
-        "search.algorithm": "multistart",
-        "search.multistart": MultistartSettings(starts=1, horizons=()),
-        "refinement": RefinementSettings(iterations=40),
-    }
-    ladder = settings_of(OF_JOINTS).changed(changes)
+    one_model = {"simulation.model": "quasi-static"}
+    ladder = settings_of(OF_JOINTS).changed(CHANGES | one_model)
     machine = ladder.of_estimate(name)
     truth = {"open_2": 0.35, "open_3": 0.3, "P_flow": 3.0} | MACHINES[name]
     known = {one: value for one, value in truth.items() if one in machine.parameters}

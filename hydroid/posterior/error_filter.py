@@ -30,6 +30,8 @@ LONGEST = 30.0
 """time constant of a lasting error at most [s]: what is longer is drift (ours)"""
 FIRST_TIME = 0.3
 """time constant of a lasting error with which the search for the numbers begins [s]"""
+DIFFERENCE = 1e-7
+"""of a logarithm, by which its derivative is taken"""
 NONE = 1e-12
 """growth of a drift, as a part of the residual's mean square, that counts as none"""
 
@@ -95,28 +97,11 @@ class Filter(NamedTuple):
 
 def make_filter(course: Course, numbers: Array) -> Filter:
     """Return the filter of a course by NUMBERS, shape (5,)."""
-    carry, step = _model(course, numbers)
+    carry, step = _model(course.period, course.way, course.stops, numbers)
     sensor = float(numbers[0])
     start = sensor / course.readings
     gain, scale = _gains(course.used, sensor, start, step, carry)
     return Filter(gain, carry, scale, step)
-
-
-def _model(course: Course, numbers: Array) -> tuple[Array, Array]:
-    """Return carry and step of drift and lasting error: both end where the joint stands
-    at a stop then."""
-    _, rate, way, lasting, time = numbers.tolist()
-    samples = len(course.way)
-    kept = np.exp(-course.period / time)
-    carry = np.ones((2, samples))
-    carry[1] = kept
-    before_stop = np.append(course.stops[1:], False)
-    carry[:, before_stop] = 0.0
-    step = np.empty((2, samples))
-    step[0] = rate * course.period + way * course.way
-    # it is added as much as is forgotten, so that the variance stays as it is
-    step[1] = lasting * (1.0 - kept**2)
-    return carry, step
 
 
 def whitened(rows: Array, period: float, sensor: float, rate: float) -> Array:
@@ -153,11 +138,19 @@ def most_likely(
     square = max(mean_square(pairs), least)
     bounds = np.log(_bounds(square, least, given))
 
-    def cost(logarithms: Array) -> float:
-        values = np.exp(logarithms)
-        return sum(
-            _negative_log_likelihood(course, error, values) for course, error in pairs
-        )
+    def cost(logarithms: Array) -> tuple[float, Array]:
+        total = np.zeros(len(logarithms) + 1)
+        for course, error in pairs:
+            total += _cost_and_slopes(
+                error,
+                course.used,
+                course.stops,
+                course.way,
+                course.period,
+                course.readings,
+                logarithms,
+            )
+        return total[0], total[1:]
 
     starts = _guesses(pairs, square) if start is None else (start,)
     options = {"maxiter": 60, "ftol": 1e-6}  # of a log-likelihood in the thousands
@@ -166,7 +159,7 @@ def most_likely(
         # a number may be 0, which has no logarithm
         begin = np.clip(np.log(np.maximum(numbers, 1e-300)), *bounds.T)
         result = minimize(
-            cost, begin, method="L-BFGS-B", bounds=bounds, options=options
+            cost, begin, method="L-BFGS-B", jac=True, bounds=bounds, options=options
         )
         ended.append(result)
     best = min(ended, key=lambda result: result.fun)
@@ -206,11 +199,26 @@ def mean_square(pairs: Pairs) -> float:
     return float(np.mean(used**2))
 
 
-def _negative_log_likelihood(course: Course, error: Array, numbers: Array) -> float:
-    carry, step = _model(course, numbers)
-    sensor = float(numbers[0])
-    start = sensor / course.readings
-    return _cost(error, course.used, sensor, start, step, carry)
+@njit(cache=True)
+def _model(
+    period: float, way: Array, stops: Mask, numbers: Array
+) -> tuple[Array, Array]:
+    """Carry and step of drift and lasting error, by `Filter`: both end where the joint
+    stands at a stop then."""
+    samples = len(way)
+    kept = np.exp(-period / numbers[4])
+    carry = np.empty((2, samples))
+    step = np.empty((2, samples))
+    for k in range(samples):
+        goes_on = 1.0
+        if k + 1 < samples and stops[k + 1]:
+            goes_on = 0.0
+        carry[0, k] = goes_on
+        carry[1, k] = goes_on * kept
+        step[0, k] = numbers[1] * period + numbers[2] * way[k]
+        # it is added as much as is forgotten, so that the variance stays as it is
+        step[1, k] = numbers[3] * (1.0 - kept**2)
+    return carry, step
 
 
 @njit(cache=True)
@@ -305,43 +313,79 @@ def _adjoint(
 
 
 @njit(cache=True)
-def _cost(
-    error: Array, used: Mask, sensor: float, start: float, step: Array, carry: Array
-) -> float:
-    """Negative log-likelihood of an error, (T,), but for a constant.
+def _costs(
+    error: Array, used: Mask, sensor: Array, start: Array, step: Array, carry: Array
+) -> Array:
+    """Negative log-likelihoods of an error, (T,), but for a constant, by n filters,
+    (n,).
 
     `_gains` and `_innovations` in one pass, which a search for the numbers repeats some
-    hundred times.
+    hundred times. `step` and `carry` are (n, 2, T). The filters take each sample
+    together: they do not wait for one another's divisions.
     """
-    drift_variance = start
-    lasting_variance = 0.0
-    covariance = 0.0
-    drift = 0.0
-    lasting = 0.0
-    cost = 0.0
+    count = len(sensor)
+    drift_variance = start.copy()
+    lasting_variance = np.zeros(count)
+    covariance = np.zeros(count)
+    drift = np.zeros(count)
+    lasting = np.zeros(count)
+    cost = np.zeros(count)
     for k in range(len(error)):
-        if used[k]:
-            total = drift_variance + 2.0 * covariance + lasting_variance + sensor
-            new = error[k] - drift - lasting
-            cost += 0.5 * (new * new / total + np.log(total))
-            first = (drift_variance + covariance) / total
-            second = (lasting_variance + covariance) / total
-            drift += first * new
-            lasting += second * new
-            drift_variance -= first * first * total
-            lasting_variance -= second * second * total
-            covariance -= first * second * total
-        if carry[0, k] > 0.0:
-            drift_variance += step[0, k]
-            lasting_variance = carry[1, k] ** 2 * lasting_variance + step[1, k]
-            covariance *= carry[1, k]
-        else:
-            drift_variance = 0.0
-            lasting_variance = 0.0
-            covariance = 0.0
-        drift *= carry[0, k]
-        lasting *= carry[1, k]
+        for i in range(count):
+            if used[k]:
+                both = covariance[i]
+                to_drift = drift_variance[i] + both
+                to_lasting = lasting_variance[i] + both
+                total = to_drift + to_lasting + sensor[i]
+                new = error[k] - drift[i] - lasting[i]
+                cost[i] += 0.5 * (new * new / total + np.log(total))
+                first = to_drift / total
+                second = to_lasting / total
+                drift[i] += first * new
+                lasting[i] += second * new
+                drift_variance[i] -= first * to_drift
+                lasting_variance[i] -= second * to_lasting
+                covariance[i] -= first * to_lasting
+            kept = carry[i, 1, k]
+            if carry[i, 0, k] > 0.0:
+                drift_variance[i] += step[i, 0, k]
+                lasting_variance[i] = kept**2 * lasting_variance[i] + step[i, 1, k]
+                covariance[i] *= kept
+            else:
+                drift_variance[i] = 0.0
+                lasting_variance[i] = 0.0
+                covariance[i] = 0.0
+            drift[i] *= carry[i, 0, k]
+            lasting[i] *= kept
     return cost
+
+
+@njit(cache=True)
+def _cost_and_slopes(
+    error: Array,
+    used: Mask,
+    stops: Mask,
+    way: Array,
+    period: float,
+    readings: float,
+    logarithms: Array,
+) -> Array:
+    """The cost of `_costs` at logarithms of NUMBERS, (5,), and its derivatives by them,
+    in one array of shape (6,)."""
+    count = len(logarithms) + 1
+    numbers = np.empty((count, len(logarithms)))
+    carry = np.empty((count, 2, len(error)))
+    step = np.empty((count, 2, len(error)))
+    for i in range(count):
+        changed = logarithms.copy()
+        if i > 0:
+            changed[i - 1] += DIFFERENCE
+        numbers[i] = np.exp(changed)
+        carry[i], step[i] = _model(period, way, stops, numbers[i])
+    sensor = numbers[:, 0].copy()
+    costs = _costs(error, used, sensor, sensor / readings, step, carry)
+    costs[1:] = (costs[1:] - costs[0]) / DIFFERENCE
+    return costs
 
 
 @njit(cache=True)

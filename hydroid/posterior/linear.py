@@ -96,7 +96,9 @@ def linearised(
 
     The first differences are by each parameter, p simulations. Then come differences of
     a standard deviation to each side along the axes of the covariance that follows, 2 p
-    or more. They are taken once more where a standard deviation changed to four times
+    or more. The axes are of one joint's parameters alone where there are such: then
+    what the other joints' valves open is known from the other differences. They are
+    taken once more where a standard deviation changed to four times
     or a quarter: the first axes were that far off. `first` are derivatives to begin
     with, shape (p, R), such as those of the least squares that ended there.
     """
@@ -113,10 +115,11 @@ def linearised(
     diverging = np.logical_not(np.isfinite(slopes).all(axis=1))
     slopes[diverging] = 0.0
     now = Linear(box, here, slopes, prior_slopes(problem.priors, box), diverging)
+    owner = problem.bindings.owners()[box.varied]
     for _ in range(2):
         white = now.white
         slopes = differentiate(
-            likelihood.innovations, box, white.axes(step=1.0), here, now.slopes
+            likelihood.innovations, box, white.axes(1.0, owner), here, now.slopes
         )
         now = replace(now, slopes=slopes)
         before = white.deviations

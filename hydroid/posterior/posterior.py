@@ -18,7 +18,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.stats import norm as normal
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.estimate import Covariance
 from hydroid.identified_model import IdentifiedModel
 from hydroid.parameters import ParameterSet
@@ -92,10 +92,10 @@ class Posterior:
         change over their sd."""
         return replace(self, root=regular(np.vstack([self.root, rows])))
 
-    def axes(self, step: float) -> Axes:
-        """Return steps of so many standard deviations along the axes of the
-        covariance."""
-        return covariance_axes(self.box, self.root, step)
+    def axes(self, step: float, owner: Ints | None = None) -> Axes:
+        """Return steps of so many standard deviations along the axes of the covariance,
+        of all parameters, or of each owner's, (p,), by `covariance_axes`."""
+        return covariance_axes(self.box, self.root, step, owner)
 
     def marginal(self, chosen: Mask) -> "Posterior":
         """Return what is known of some of the parameters, shape (P,), whatever the

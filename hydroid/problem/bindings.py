@@ -5,10 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Ints, Mask, record
 from hydroid.errors import SettingsError
 from hydroid.hydraulics.records import nominal_joints
 from hydroid.quantity_table import QUANTITIES, TARGETS
+from hydroid.search.axes import SHARED
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
@@ -48,6 +49,7 @@ class Bindings:
         self._stage = settings.stage
         self.group_of = settings.log.group_of
         self._nominal = nominal_joints(settings.arm, settings.hydraulics)
+        self._columns = len(settings.parameters)
         bindings: list[Binding] = []
         for column, (name, parameter) in enumerate(settings.parameters.items()):
             targets = _targets(settings.arm, name, parameter)
@@ -73,6 +75,15 @@ class Bindings:
                     f"parameters.{name}",
                     "give each its own joints, or remove one",
                 )
+
+    def owners(self) -> Ints:
+        """Return the joint, 0-based, that each parameter acts on alone, shape (P,), or
+        SHARED: a link's mass loads other joints too."""
+        owner = np.full(self._columns, SHARED)
+        for binding in self._bindings:
+            if binding.quantity != "mass" and len(binding.targets) == 1:
+                owner[binding.column] = binding.targets[0]
+        return owner
 
     def candidates(self, theta: Array, log: str = "") -> Candidates:
         """Spread theta, shape (n, P), over joints and links, in SI, as they are in a

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hydroid.arrays import Array, Mask, record
+from hydroid.arrays import Array, Ints, Mask, record
 
 Function = Callable[[Array], Array]
 """points (n, P) -> values (n, R); a row that is not finite is a point that cannot be
@@ -30,6 +30,10 @@ SHORTER = 0.1
 CURVED = 0.3
 """part of the long step's slope; where the short step's is smaller,
 the long one's is mostly curvature"""
+
+
+SHARED = -1
+"""owner of a coordinate that is not of one owner alone"""
 
 
 @record
@@ -150,7 +154,9 @@ def single_axes(at: Box, step: float) -> Axes:
     return _fitted(np.eye(coordinates), wanted, room)
 
 
-def covariance_axes(at: Box, root: Array, step: float) -> Axes:
+def covariance_axes(
+    at: Box, root: Array, step: float, owner: Ints | None = None
+) -> Axes:
     """Return steps of so many standard deviations along the axes of a covariance.
 
     The axes are those of the coordinates off their bounds. A coordinate at a bound has
@@ -158,23 +164,42 @@ def covariance_axes(at: Box, root: Array, step: float) -> Axes:
     direction leads out of the bounds to both sides. `root` is G of C^-1 = G' G, of full
     rank, (p, p): a relative change v is
     |G v| standard deviations long.
+
+    With an `owner` of each coordinate, (p,), the axes are of one owner's coordinates
+    alone, while the others stay. Those that are SHARED have axes of their own, and all
+    owners' coordinates change with them.
     """
     room = at.room
     deviation = np.linalg.norm(np.linalg.inv(root), axis=1)
     held = held_by_bound(room, deviation)
     inner = np.flatnonzero(~held)
-    at_bound = np.flatnonzero(held)
-    directions = np.eye(len(root))[[*inner, *at_bound]]
-    if len(inner):
-        left, values, axes = np.linalg.svd(root[:, inner], full_matrices=False)
-        directions[: len(inner), inner] = axes
-        # the change of the others that keeps a coordinate at its bound as short as can
-        # be
-        pulled = (left.T @ root[:, at_bound]) / values[:, None]
-        follow = axes.T @ pulled
-        directions[len(inner) :, inner] = -follow.T
+    if owner is None:
+        owner = np.full(len(root), SHARED)
+    of_inner = owner[inner]
+    shared = inner[of_inner == SHARED]
+    owned = inner[of_inner != SHARED]
+    none = np.array([], dtype=int)
+    rows = list[Array]()
+    for one in np.unique(owner[owned]):
+        rows.append(_axes_of(root, owned[owner[owned] == one], none))
+    rows.append(_axes_of(root, shared, owned))
+    for coordinate in np.flatnonzero(held):
+        rows.append(_axes_of(root, np.array([coordinate]), inner))
+    directions = np.vstack(rows)
     lengths = np.linalg.norm(root @ directions.T, axis=0)
     return _fitted(directions, step / lengths, room)
+
+
+def _axes_of(root: Array, chosen: Ints, following: Ints) -> Array:
+    """Return the axes of the covariance of some coordinates, (c, p), while those that
+    follow change so that each axis stays as short as can be."""
+    follow = np.linalg.lstsq(root[:, following], -root[:, chosen], rcond=None)[0]
+    left = root[:, chosen] + root[:, following] @ follow
+    axes = np.linalg.svd(left, full_matrices=False)[2]
+    rows = np.zeros((len(chosen), len(root)))
+    rows[:, chosen] = axes
+    rows[:, following] = axes @ follow.T
+    return rows
 
 
 def held_by_bound(room: Array, deviation: Array) -> Mask:

@@ -18,6 +18,7 @@ from hydroid.posterior.error_model import (
 )
 from hydroid.problem.channels import Channel
 from hydroid.problem.priors import Priors
+from hydroid.search.axes import SHARED
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings, PriorSettings
 
@@ -80,6 +81,13 @@ class Linear:
 
     def started(self, log):
         return [2]
+
+    @property
+    def bindings(self):
+        return self
+
+    def owners(self):
+        return np.full(len(self.parameters.names), SHARED)
 
     def output_errors(self, theta):
         self.simulated += len(theta)

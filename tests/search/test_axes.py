@@ -4,7 +4,14 @@ are known."""
 import numpy as np
 import pytest
 
-from hydroid.search.axes import Axes, Box, covariance_axes, differentiate, single_axes
+from hydroid.search.axes import (
+    SHARED,
+    Axes,
+    Box,
+    covariance_axes,
+    differentiate,
+    single_axes,
+)
 
 SLOPES = np.random.default_rng(1).normal(size=(3, 40))
 ROOT = np.array([[100.0, 99.0, 0.0], [0.0, 2.0, 1.0], [0.0, 0.0, 50.0]])
@@ -30,13 +37,30 @@ def test_a_linear_function_is_differentiated_exactly_inside_and_at_bounds(at, si
         visited.append(points)
         return linear(points)
 
-    for axes in (single_axes(here, 1e-3), covariance_axes(here, ROOT, 1.0)):
+    owner = np.array([0, SHARED, 1])
+    for axes in (
+        single_axes(here, 1e-3),
+        covariance_axes(here, ROOT, 1.0),
+        covariance_axes(here, ROOT, 1.0, owner),
+    ):
         np.testing.assert_allclose(
             differentiate(function, here, sided(axes)), SLOPES, rtol=1e-8, atol=1e-8
         )
     points = np.vstack(visited)
     assert (points >= here.lower).all()
     assert (points <= here.upper).all()
+
+
+def test_axes_of_an_owner_leave_the_others_and_shared_ones_carry_them_along():
+    owner = np.array([0, SHARED, 1])
+    axes = covariance_axes(box(), ROOT, 0.01, owner)
+    of_first, of_second, shared = axes.directions
+    np.testing.assert_array_equal(of_first != 0.0, [True, False, False])
+    np.testing.assert_array_equal(of_second != 0.0, [False, False, True])
+    # as short as can be: what is left has nothing along the owners' effects
+    np.testing.assert_allclose(ROOT @ shared @ ROOT[:, [0, 2]], 0.0, atol=1e-9)
+    lengths = np.linalg.norm(ROOT @ axes.directions.T, axis=0)
+    np.testing.assert_allclose(lengths * axes.steps[:, 0], 0.01)
 
 
 def test_held_coordinates_stay():

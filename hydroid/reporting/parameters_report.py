@@ -13,6 +13,7 @@ from hydroid.findings import Finding
 from hydroid.parameters import Parameter, Prior
 from hydroid.posterior.uncertainty import Flag, Source
 from hydroid.reporting.chart import Chart, Mark, Panel
+from hydroid.reporting.held_values import held_table
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.naming import belongs_to, named, quantity_and_side
@@ -62,8 +63,12 @@ def parameter_section(
             f"settings, {supply} bar."
         )
     tables = {"parameters": short_table(settings, summary)}
+    held = held_table(settings)
+    if held.rows:
+        tables["held"] = held
     at_bounds = _at_bounds(summary)
-    answer = f"{known_of_free(summary)}; at a bound: {at_bounds or 'none'}"
+    count = sum(bool(estimate.at_bound) for estimate in summary.estimate.values())
+    answer = f"{known_of_free(summary)}; at a bound: {count or 'none'}"
     said = [*held_masses(settings), *points]
     if at_bounds:
         said.insert(0, f"At a bound: {at_bounds}.")

@@ -8,11 +8,13 @@ import pytest
 from linear_problem import ar1
 from report_fits import MODEL, make_fit, make_problem, make_record, make_uncertainty
 
+from hydroid import load_settings
 from hydroid.commands.fit import fit_result
 from hydroid.estimate import QuantityEstimate
 from hydroid.findings import OF_OPTIMUM, Finding
 from hydroid.fitting import verdict as verdict_of
 from hydroid.fitting.summary import summarise
+from hydroid.reporting.held_values import held_table
 from hydroid.reporting.knowledge_report import (
     error_section,
     every_quantity_section,
@@ -311,3 +313,15 @@ def test_a_fit_whose_time_was_up_gives_no_advice_that_holds_only_of_an_optimum(
     assert said.count("--resume") == is_up
     assert said.count("time was up") == is_up
     assert "The time for the fit was up" not in said
+
+
+def test_the_settings_hold_what_no_parameter_states():
+    settings = load_settings(
+        "fit-hyd", {"hydraulics.pump_flow": 90.0, "hydraulics.bulk_modulus": 9e3}
+    )
+    rows = {row[1]: row[2:] for row in held_table(settings).rows}
+    assert rows["largest flow of the pump"] == (90.0, "L/min", "settings")
+    assert rows["supply pressure"][2] == "default"
+    # what is off, and what is a parameter, is not among them
+    assert "dead band of the pilot stage" not in rows
+    assert "transport delay of the command" not in rows

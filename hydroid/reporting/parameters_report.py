@@ -143,9 +143,7 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         estimate = summary.estimate[name]
         source = origin(estimate)
         if estimate.data_share:
-            percent = round(100 * estimate.data_share)
-            shares = f"{percent} % data, {100 - percent} % prior"
-            source = source.replace(Source.BOTH, shares)
+            source = shares_in_words(source, estimate.data_share)
         row = _what_it_is(settings, name, estimate)
         row["side"] = _side_and_word(settings, name, summary)
         # what a search leaves of 0 is 0
@@ -161,6 +159,12 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
     if summary.left_out_deg:
         note += _BY_LOG
     return Table.of("Parameters", {name: name for name in columns}, rows, note)
+
+
+def shares_in_words(source: str, share: float) -> str:
+    """Return words for a source, with the shares of data and prior where it is both."""
+    percent = round(100 * share)
+    return source.replace(Source.BOTH, f"{percent} % data, {100 - percent} % prior")
 
 
 def first_joint(settings: FitSettings, name: str) -> int:

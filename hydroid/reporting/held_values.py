@@ -1,10 +1,14 @@
 """What a fit takes from its settings without estimating it."""
 
+from dataclasses import replace
+
 from hydroid.quantity_table import HYDRAULIC
 from hydroid.reporting.page import Cell, Given, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed
 
+OF_SPRING = ("oil_damping", "oil_damping_share")
+"""quantities of a spring of oil: without its frequency they change nothing"""
 _HEADER = ("joint", "quantity", "value", "unit", "from")
 _NOTE = (
     "Not estimated. default: hydroid's own value. Geometry, areas and masses that are no parameters "
@@ -22,9 +26,7 @@ def held_table(settings: FitSettings) -> Table:
     for name, quantity in HYDRAULIC.items():
         joints = _held_joints(settings, name)
         value = getattr(settings.hydraulics, name)
-        # None is no limit, and a ratio of 1 changes nothing
-        off = not value or (value == 1.0 and not quantity.unit)
-        if value is None or off or not joints or not settings.rung.has(name):
+        if value is None or not joints or _is_off(settings, name):
             continue
         side = name[-2:] if name[-2:] in ("_a", "_b") else ""
         base = name.removesuffix(side)
@@ -37,7 +39,21 @@ def held_table(settings: FitSettings) -> Table:
         of = "" if every else listed([settings.arm.name_of(joint) for joint in joints])
         source = "default" if value == quantity.default else "settings"
         rows[of, words, Given(value), quantity.unit, source] = None
-    return Table("Held by the settings", _HEADER, tuple(rows), _NOTE)
+    table = Table("Held by the settings", _HEADER, tuple(rows), _NOTE)
+    if not any(row[0] for row in rows):
+        return replace(table, header=_HEADER[1:], rows=tuple(row[1:] for row in rows))
+    return table
+
+
+def _is_off(settings: FitSettings, name: str) -> bool:
+    """Return whether a quantity changes nothing at the value of the settings."""
+    value = getattr(settings.hydraulics, name)
+    has_spring = settings.hydraulics.oil_frequency is not None
+    # a fit may estimate the frequency instead
+    has_spring |= _held_joints(settings, "oil_frequency") != [*settings.outputs]
+    if not settings.rung.has(name) or (name in OF_SPRING and not has_spring):
+        return True
+    return value == 0.0 or (value == 1.0 and not HYDRAULIC[name].unit)
 
 
 def _held_joints(settings: FitSettings, name: str) -> list[int]:

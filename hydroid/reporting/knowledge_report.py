@@ -11,7 +11,7 @@ from hydroid.findings import Finding
 from hydroid.fitting.validation import HORIZONS
 from hydroid.fitting.verdict import THE_FIT
 from hydroid.joint_verdict import JointVerdict
-from hydroid.posterior.uncertainty import Source, source_of
+from hydroid.posterior.uncertainty import source_of
 from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.parameters_report import held_masses, sentence, shares_in_words
 from hydroid.settings.fit import FitSettings
@@ -53,6 +53,8 @@ _MEASURED_ERRORS = (
     "than expected where parameters or the model err, or where something differs in these logs. "
     "The bands allow for inexact parameters."
 )
+MOSTLY = 0.5
+"""share of the information below which the logs gave the lesser part of it"""
 ELSEWHERE = ("combination", "error lasts")
 """findings that another section of the page shows better"""
 
@@ -203,9 +205,12 @@ def quantity_source(quantity: QuantityEstimate) -> str:
 
 
 def _within(quantity: QuantityEstimate) -> str:
-    """Write an interval, and that it is the prior's if it is."""
-    from_prior = quantity_source(quantity) == Source.PRIOR
-    return _ends(quantity) + (" (prior only)" if from_prior else "")
+    """Write an interval, and how much of it is the prior's where most is: it is then no
+    news from the logs."""
+    share = quantity.data_share
+    if share is None or share >= MOSTLY:
+        return _ends(quantity)
+    return f"{_ends(quantity)} ({100 * (1 - share):.0f} % prior)"
 
 
 def _ends(quantity: QuantityEstimate) -> str:

@@ -75,11 +75,12 @@ def slow_down(model: IdentifiedModel, logs: Sequence[Log]) -> SlowDown | None:
     if not rows:
         return None
     said = [
-        f"{settings.arm.name_of(joint)} {_percent(change)} (beside {other})"
+        f"{settings.arm.name_of(joint)} {_percent(change)} ({other})"
         for joint, (change, other) in most.items()
     ]
     return SlowDown(
-        Table("", header, tuple(rows), _NOTE), f"two joints at once: {listed(said)}"
+        Table("", header, tuple(rows), _NOTE),
+        f"speed beside another joint: {listed(said)}",
     )
 
 

@@ -32,9 +32,9 @@ _FITTED = (
     "The last three columns are simple models."
 )
 _TESTED = (
-    "Rms errors{unit} on {count} unseen log{s}{lengths}, which the fit did not use: after "
-    "predicting 1, 5 and 10 s ahead, and over whole logs. In brackets: the error of the best "
-    "simple model. Better, worse: than that model. Cannot be told: the difference may be chance. "
+    "Rms errors{unit} on {count} unseen log{s}{lengths}, which the fit did not use: 1, 5 and 10 s "
+    "ahead, and over whole logs. In brackets: the error of the best simple model. Better, worse: "
+    "than it. Cannot be told: the difference may be chance. "
     "Good up to: the error over whole logs that is allowed, by default 2 % of travel."
 )
 _HOLDS = "Holds for free motion with the loads, the oil temperature and the engine speed of these logs. "

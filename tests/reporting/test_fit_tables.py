@@ -220,7 +220,7 @@ def test_the_card_of_a_joint_has_both_directions_and_how_it_swings():
     assert [(row[0], row[3]) for row in rows] == [
         ("50 % up", "± 10 %"),
         ("100 % down (extrapolated: the logs reach 60 %)", "± 4 %"),
-        ("late down", "± 10 % (prior only)"),
+        ("late down", "± 10 % (95 % prior)"),
         ("damping", "0.010 to 0.19"),
     ]
 
@@ -325,7 +325,7 @@ def test_the_settings_hold_what_no_parameter_states():
     settings = load_settings(
         "fit-hyd", {"hydraulics.pump_flow": 90.0, "hydraulics.bulk_modulus": 9e3}
     )
-    rows = {row[1]: row[2:] for row in held_table(settings).rows}
+    rows = {row[0]: row[1:] for row in held_table(settings).rows}
     assert rows["largest flow of the pump"] == (90.0, "L/min", "settings")
     assert rows["supply pressure"][2] == "default"
     # what is off, and what is a parameter, is not among them

@@ -50,7 +50,7 @@ def test_a_joint_beside_another_is_as_slow_as_the_plant_says():
     lost = float(str(change).removesuffix(" %").replace("−", "-"))
     assert lost == pytest.approx(100 * (beside / alone - 1), abs=0.5)
     assert second[0] == "elbow"
-    assert f"shoulder {change} (beside elbow)" in slower.answer
+    assert f"shoulder {change} (elbow)" in slower.answer
 
 
 def test_joints_that_share_no_limited_pump_are_not_slower():

@@ -170,7 +170,10 @@ def validity_section(run: FinishedRun) -> Section:
 
 def _limits(settings: FitSettings) -> Iterator[str]:
     """Yield what the model leaves out, whatever the logs cover."""
-    yield "Limit: free motion. The model has no contact, such as a bucket that digs."
+    yield (
+        "Limit: free motion of stiff links. The model has no contact, such as a bucket that digs, no "
+        "play, and no hysteresis of valves."
+    )
     missing = list[str]()
     if settings.log.oil_temperature is None:
         missing.append("oil temperature")

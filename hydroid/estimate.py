@@ -109,6 +109,8 @@ class QuantityEstimate(Settings):
     reach: float | None = None
     """largest command of the logs in its direction [%], where it is of a larger one;
     null: the logs have its command"""
+    data_share: float | None = None
+    """part of the information that the logs gave; the rest is the priors'"""
 
     @property
     def said(self) -> str:

@@ -42,13 +42,15 @@ class Estimated:
     """Some quantities at an estimate, shape (m,), NaN where one does not exist.
 
     `sd` is infinite where not determined, NaN where unknown; `interval` is of 95 %, (m,
-    2); no parameter changes those that are `given`.
+    2); no parameter changes those that are `given`. `slopes` are derivatives per relative
+    change of the p parameters that vary, (p, m).
     """
 
     value: Array
     sd: Array
     interval: Array
     given: Mask
+    slopes: Array
 
 
 @record
@@ -147,7 +149,7 @@ class Posterior:
         # a relative change by less than a thousandth of a parameter's: the settings
         # give it
         given = np.all(abs(slopes) <= 1e-3 * abs(value), axis=0)
-        return Estimated(value, sd, ends, given)
+        return Estimated(value, sd, ends, given, slopes)
 
     def stored(self, parameters: ParameterSet) -> Covariance:
         """Return what a file keeps of it."""

@@ -28,6 +28,7 @@ from hydroid.posterior.bench import (
 )
 from hydroid.posterior.column import Column, Measured
 from hydroid.posterior.curves import StepCurves, opening_curve, step_curves
+from hydroid.posterior.linear import Linear, white_posterior
 from hydroid.posterior.posterior import Estimated, Posterior
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.bindings import Bindings
@@ -103,6 +104,7 @@ def _joint_quantities(
     estimate = problem.bindings.candidates(uncertainty.theta[None])
     measure = joint_measure(make_bench(settings, problem.logs, joint), estimate)
     columns, estimated = known_columns(settings, uncertainty.posterior, joint, measure)
+    shares = _data_shares(uncertainty.linear, estimated)
 
     joint_name = problem.settings.arm.name_of(joint)
     scalars = dict[str, QuantityEstimate]()
@@ -120,6 +122,7 @@ def _joint_quantities(
                 sd=finite(estimated.sd[i]),
                 interval=finite_ends(estimated.interval[i]),
                 reach=column.reach,
+                data_share=finite(shares[i]),
             )
     curves = dict[str, CurveEstimate]()
     for name, rows in points.items():
@@ -128,6 +131,16 @@ def _joint_quantities(
             of_points = [columns[i] for i in rows]
             curves[f"{joint_name}_{name}"] = _curve(of_points, estimated, rows, joint)
     return scalars, curves
+
+
+def _data_shares(linear: Linear, estimated: Estimated) -> Array:
+    """Return the part of the information on each quantity that the logs gave, 1 -
+    posterior / prior variance, (m,): as `ParameterStatus` has it of a parameter."""
+    before = white_posterior(linear.box, linear.prior_slopes)
+    with np.errstate(all="ignore"):
+        share = 1.0 - (estimated.sd / before.sd(estimated.slopes)) ** 2
+    # of a quantity that is not determined, nothing is known from anywhere
+    return np.where(np.isfinite(estimated.sd), np.clip(share, 0.0, 1.0), np.nan)
 
 
 def _curve(

@@ -93,10 +93,15 @@ class ParameterStatus:
         is fixed."""
         if self.flag is Flag.FIXED or not self.known:
             return None
-        # nine tenths of the information are the only source that is named
-        if self.share > 0.9:
-            return Source.DATA
-        return Source.BOTH if self.share >= 0.1 else Source.PRIOR
+        return source_of(self.share)
+
+
+def source_of(share: float) -> Source:
+    """Return the source of what is known, of which the logs gave a share."""
+    # nine tenths of the information are the only source that is named
+    if share > 0.9:
+        return Source.DATA
+    return Source.BOTH if share >= 0.1 else Source.PRIOR
 
 
 def flag_of(relative_sd: float, share: float = 1.0) -> Flag:

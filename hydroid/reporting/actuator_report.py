@@ -133,9 +133,7 @@ def speed_section(
     title = "Speed against command"
     text = _SPEED_ALONE
     fastest = [*filter(None, fastest)]
-    answer = (
-        f"the model's speed at the largest commands of the logs: {'; '.join(fastest)}"
-    )
+    answer = f"the model's speed at the logs' largest commands: {'; '.join(fastest)}"
     if shut:
         title = "Valve: dead band, opening, and speed against command"
         text = _SPEED + _pump_words(settings, summary)
@@ -228,7 +226,8 @@ def _fastest(name: str, speed: CurveEstimate, commands: Commands, words: Words) 
         if largest:
             size = abs(np.interp(largest, speed.at, speed.value))
             word = words[towards] or towards
-            top = f"{two_digits(float(size))} {speed.unit}"
+            # its unit stands once for a joint
+            top = two_digits(float(size)) + ("" if said else f" {speed.unit}")
             said.append(f"{word} {top} at {largest:+.0f} %".replace("-", "−"))
     return f"{name} {', '.join(said)}" if said else ""
 

@@ -11,8 +11,9 @@ from hydroid.findings import Finding
 from hydroid.fitting.validation import HORIZONS
 from hydroid.fitting.verdict import THE_FIT
 from hydroid.joint_verdict import JointVerdict
+from hydroid.posterior.uncertainty import source_of
 from hydroid.reporting.page import Cell, Section, Table
-from hydroid.reporting.parameters_report import held_masses, sentence
+from hydroid.reporting.parameters_report import held_masses, sentence, shares_in_words
 from hydroid.settings.fit import FitSettings
 from hydroid.units import Display
 from hydroid.words import interval_words, listed, significant, two_digits, value_words
@@ -52,6 +53,8 @@ _MEASURED_ERRORS = (
     "than expected where parameters or the model err, or where something differs in these logs. "
     "The bands allow for inexact parameters."
 )
+MOSTLY = 0.5
+"""share of the information below which the logs gave the lesser part of it"""
 ELSEWHERE = ("combination", "error lasts")
 """findings that another section of the page shows better"""
 
@@ -152,11 +155,15 @@ def every_quantity_section(
     for name, quantity in _by_joint(settings, summary):
         value = value_words(quantity.value, *quantity.interval)
         between = interval_words(*quantity.interval)
-        rows.append((name, quantity.said, value, quantity.unit, between))
+        source = quantity_source(quantity)
+        rows.append((name, quantity.said, value, quantity.unit, between, source))
     if not rows:
         return None
-    header = ("joint", "quantity", "value", "unit", "95 %")
-    note = "95 %: confidence interval; empty: no limit."
+    header = ("joint", "quantity", "value", "unit", "95 %", "source")
+    note = (
+        "95 %: confidence interval; empty: no limit. source: what the interval comes from, the logs "
+        "(data) or the priors of the settings; empty: not determined."
+    )
     text = (
         "What follows from the parameters of each joint. Quantities that are parameters "
         "themselves, such as the dead band of a pilot stage, are in the table of parameters. Flow: "
@@ -172,8 +179,8 @@ def quantity_table(settings: FitSettings, summary: FitSummary) -> Table:
     rows = list[tuple[Cell, ...]]()
     for name, quantity in _by_joint(settings, summary):
         value = quantity.value, quantity.unit, *quantity.interval
-        rows.append((name, quantity.said, *value))
-    header = ("joint", "quantity", "value", "unit", "from", "to")
+        rows.append((name, quantity.said, *value, quantity_source(quantity)))
+    header = ("joint", "quantity", "value", "unit", "from", "to", "source")
     return Table("", header, tuple(rows))
 
 
@@ -187,7 +194,26 @@ def _by_joint(
                 yield settings.arm.name_of(joint), quantity
 
 
+def quantity_source(quantity: QuantityEstimate) -> str:
+    """Say whether a quantity is known from the logs or from the priors, in the words of
+    the parameters; nothing of one that is not determined."""
+    share = quantity.data_share
+    if share is None:
+        return ""
+    source = source_of(share)
+    return shares_in_words(source, share)
+
+
 def _within(quantity: QuantityEstimate) -> str:
+    """Write an interval, and how much of it is the prior's where most is: it is then no
+    news from the logs."""
+    share = quantity.data_share
+    if share is None or share >= MOSTLY:
+        return _ends(quantity)
+    return f"{_ends(quantity)} ({100 * (1 - share):.0f} % prior)"
+
+
+def _ends(quantity: QuantityEstimate) -> str:
     """Write an interval: of a percentage, or one that is wide, its ends, since ± 3 % of
     40 % could mean either."""
     low, high = quantity.interval

@@ -7,6 +7,7 @@ from hydroid.identified_model import IdentifiedModel
 from hydroid.log import Log
 from hydroid.posterior.posterior import stored_posterior
 from hydroid.posterior.under_load import Known, MovedUnderLoad, UnderLoad, under_load
+from hydroid.reporting.knowledge_report import quantity_source
 from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.stated_values import value_and_origin
 from hydroid.settings.fit import FitSettings
@@ -53,7 +54,7 @@ def load_section(model: IdentifiedModel, logs: Sequence[Log]) -> Section | None:
     carried = list[tuple[Cell, ...]]()
     loaded = list[tuple[Cell, ...]]()
     for one in joints:
-        row = _carried_row(settings, one)
+        row = _carried_row(settings, summary, one)
         if has_valves:
             row += (leakage(settings, summary, one.joint), _creeps(settings, one))
         carried.append(row)
@@ -112,24 +113,29 @@ def _percent(change: Known) -> str:
     return f"{percent:+d} %".replace("-", "−") if percent else "0 %"
 
 
-def _carried_row(settings: FitSettings, one: UnderLoad) -> tuple[Cell, ...]:
+def _carried_row(
+    settings: FitSettings, summary: FitSummary, one: UnderLoad
+) -> tuple[Cell, ...]:
     """Return what a joint carries, and where."""
+    name = settings.arm.name_of(one.joint)
     slides = settings.arm.joint(one.joint).slides
     forces, masses = ("N", "kg") if slides else ("N·m", "kg·m²")
     low, high = map(three_digits, one.over_travel)
-    gravity = _known(one.gravity, forces)
+    stated = summary.quantities.get(f"{name}_gravity_torque_at_pose")
+    source = quantity_source(stated) if stated else ""
+    gravity = _known(one.gravity, forces, source)
     along = f"{low} to {high} {forces}"
     inertia = _known(one.inertia, masses)
-    return settings.arm.name_of(one.joint), one.pose, gravity, along, inertia
+    return name, one.pose, gravity, along, inertia
 
 
-def _known(known: Known, unit: str) -> str:
-    """Write a value with its unit, and its interval, or that it is given."""
+def _known(known: Known, unit: str, source: str = "") -> str:
+    """Write a value with its unit, its interval and its source, or that it is given."""
     value = f"{value_words(known.value, *known.interval)} {unit}"
     if known.given:
         return f"{three_digits(known.value)} {unit} (given)"
     between = interval_words(*known.interval)
-    return f"{value} ({between or 'not known'})"
+    return f"{value} ({'; '.join(filter(None, (between or 'not known', source)))})"
 
 
 def _creeps(settings: FitSettings, one: UnderLoad) -> str:

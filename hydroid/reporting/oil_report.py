@@ -12,6 +12,7 @@ from hydroid.fitting.validation import Prediction
 from hydroid.prediction import OilTrace
 from hydroid.reporting.page import Cell, Section, Table, log_names
 from hydroid.reporting.response_report import BAR, LITRES_PER_MINUTE
+from hydroid.reporting.shared_pump import SlowDown
 from hydroid.reporting.stated_values import value_and_origin, value_of
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
@@ -51,9 +52,13 @@ class _Peak:
 
 
 def oil_section(
-    settings: FitSettings, summary: FitSummary, predictions: Sequence[Prediction]
+    settings: FitSettings,
+    summary: FitSummary,
+    predictions: Sequence[Prediction],
+    slower: SlowDown | None,
 ) -> Section | None:
-    """Return the section of the largest pressures and flows.
+    """Return the section of the largest pressures and flows, and of how much slower
+    joints are beside each other.
 
     None: the model has no hydraulics, or every simulation diverged.
     """
@@ -71,12 +76,12 @@ def oil_section(
         pump_words = _PUMP
         most = value_and_origin(settings, summary, "pump_flow")
         tables["pump"] = Table("", _PUMP_HEADER, (pump,))
-        _, high, low, log, time = pump
+        _, high, low, *_ = pump
         flow = two_digits(value_of(settings, summary, "pump_flow")[0] or 0.0)
-        answer = (
-            f"the pump's line falls from {high} to {low} bar ({log}, {time} s); "
-            f"the pump gives at most {flow} L/min"
-        )
+        answer = f"the pump gives at most {flow} L/min, and its line falls from {high} to {low} bar"
+    if slower:
+        tables["slower"] = slower.table
+        answer += f"; {slower.answer}"
     measured = _measured_words(predictions)
     text = (
         f"{_TEXT} {measured.capitalize()}."
@@ -84,9 +89,10 @@ def oil_section(
         + _NO_RELIEF
     )
     answer += f"; {measured}"
-    return Section(
-        "Pressures and flows", text, tables=tables, folded=True, answer=answer
-    )
+    title = "Pressures, flows, shared pump"
+    if slower is None:
+        title = "Pressures and flows"
+    return Section(title, text, tables=tables, folded=True, answer=answer)
 
 
 def _measured_words(predictions: Sequence[Prediction]) -> str:

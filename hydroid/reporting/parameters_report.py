@@ -13,6 +13,7 @@ from hydroid.findings import Finding
 from hydroid.parameters import Parameter, Prior
 from hydroid.posterior.uncertainty import Flag, Source
 from hydroid.reporting.chart import Chart, Mark, Panel
+from hydroid.reporting.held_values import held_table
 from hydroid.reporting.page import Cell, Given, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.naming import belongs_to, named, quantity_and_side
@@ -62,8 +63,12 @@ def parameter_section(
             f"settings, {supply} bar."
         )
     tables = {"parameters": short_table(settings, summary)}
+    held = held_table(settings)
+    if held.rows:
+        tables["held"] = held
     at_bounds = _at_bounds(summary)
-    answer = f"{known_of_free(summary)}; at a bound: {at_bounds or 'none'}"
+    count = sum(bool(estimate.at_bound) for estimate in summary.estimate.values())
+    answer = f"{known_of_free(summary)}; at a bound: {count or 'none'}"
     said = [*held_masses(settings), *points]
     if at_bounds:
         said.insert(0, f"At a bound: {at_bounds}.")
@@ -138,9 +143,7 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
         estimate = summary.estimate[name]
         source = origin(estimate)
         if estimate.data_share:
-            percent = round(100 * estimate.data_share)
-            shares = f"{percent} % data, {100 - percent} % prior"
-            source = source.replace(Source.BOTH, shares)
+            source = shares_in_words(source, estimate.data_share)
         row = _what_it_is(settings, name, estimate)
         row["side"] = _side_and_word(settings, name, summary)
         # what a search leaves of 0 is 0
@@ -156,6 +159,12 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
     if summary.left_out_deg:
         note += _BY_LOG
     return Table.of("Parameters", {name: name for name in columns}, rows, note)
+
+
+def shares_in_words(source: str, share: float) -> str:
+    """Return words for a source, with the shares of data and prior where it is both."""
+    percent = round(100 * share)
+    return source.replace(Source.BOTH, f"{percent} % data, {100 - percent} % prior")
 
 
 def first_joint(settings: FitSettings, name: str) -> int:

@@ -37,6 +37,7 @@ from hydroid.reporting.parameters_report import (
 from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.response_report import error_table, response_section
 from hydroid.reporting.search_report import search_section
+from hydroid.reporting.shared_pump import slow_down
 from hydroid.reporting.validity_report import validity_section
 from hydroid.reporting.verdict_table import (
     Verdicts,
@@ -66,7 +67,7 @@ def validation_page(
     Its tables are `verdict`, `errors` and `horizons`.
     """
     ordered = sorted(predictions, key=lambda p: p.unseen is not True)
-    verdicts = verdict_sections(fits, *steps)
+    verdicts = verdict_sections(fits, predictions, *steps)
     sections = (*verdicts, *prediction_sections(ordered, arm, fits))
     logs = dict.fromkeys(prediction.log.source for prediction in ordered)
     return Page(
@@ -149,14 +150,14 @@ def _fit_sections(
     logs = [prediction.log for prediction in fitted]
     step = next_step(summary, run.verdict, run.folder, fitted)
     sections = (
-        *verdict_sections(fits, step),
+        *verdict_sections(fits, shown, step),
         *prediction_sections(shown, settings.arm, fits),
         quantity_section(settings, summary),
         error_section(settings, summary, run.verdict),
         validity_section(run),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
-        oil_section(settings, summary, shown),
+        oil_section(settings, summary, shown, slow_down(run.model, logs)),
         speed_section(settings, summary, logs),
         step_section(settings, summary),
         load_section(run.model, logs),

@@ -68,9 +68,6 @@ def _answer(run: FinishedRun) -> str:
     answers = [_reached(run)]
     if run.seconds:
         answers.append(f"it took {time_words(sum(run.seconds.values()))}")
-    simulations = sum(effort.simulations for effort in run.result.refinements)
-    if simulations:
-        answers.append(f"{simulations:,} simulations of the refinement")
     return "; ".join(answers)
 
 

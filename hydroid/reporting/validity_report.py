@@ -149,10 +149,11 @@ def validity_section(run: FinishedRun) -> Section:
     valid = [
         f"{one.joint} {_valid_commands(one)} %, {_positions(one)}" for one in joints
     ]
-    answer = f"valid for {listed(valid)}"
+    answer = f"valid for free motion, {listed(valid)}"
     if lacks:
         answer += f"; log next: {listed([one.what for one in lacks])}"
-    points = [f"Log next: {one.what}{one.where}. {one.why}" for one in lacks]
+    points = [*_limits(settings)]
+    points += [f"Log next: {one.what}{one.where}. {one.why}" for one in lacks]
     points.append(
         "Which parameter an experiment would narrow, and whether to weigh or to measure instead: "
         f"hydroid suggest --fit {shlex.quote(run.folder)}. The experiment itself: hydroid design."
@@ -165,6 +166,25 @@ def validity_section(run: FinishedRun) -> Section:
         folded=True,
         answer=answer,
     )
+
+
+def _limits(settings: FitSettings) -> Iterator[str]:
+    """Yield what the model leaves out, whatever the logs cover."""
+    yield (
+        "Limit: free motion of stiff links. The model has no contact, such as a bucket that digs, no "
+        "play, and no hysteresis of valves."
+    )
+    missing = list[str]()
+    if settings.log.oil_temperature is None:
+        missing.append("oil temperature")
+    if settings.log.engine_speed is None:
+        missing.append("engine speed")
+    if missing:
+        yield (
+            f"Limit: {listed(missing)} as in the fitted logs, which have no column of "
+            f"{'them' if len(missing) > 1 else 'it'}. Where they differ, speeds do, too: hydroid "
+            "adapt refits a few parameters to a log of that day."
+        )
 
 
 def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[Lack]:

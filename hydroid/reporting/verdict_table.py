@@ -24,21 +24,21 @@ from hydroid.units import Display, display
 from hydroid.words import listed, told_apart, two_digits
 
 _RIVALS = (
-    "The simple models of a joint: standing still; speed tables (its mean speed at each "
-    "command); nine numbers (dead band, exponent, top speed and lag for each direction, "
-    "2 x 4, and one delay)."
+    "Simple models: standing still; speed tables (mean speed at each command); nine numbers (one "
+    "delay, and for each direction dead band, exponent, top speed and lag)."
 )
 _FITTED = (
     "Rms errors{unit} on the fitted logs. No other log has tested the fit yet. "
     "The last three columns are simple models."
 )
 _TESTED = (
-    "Rms errors{unit} on {count} unseen log{s}, which the fit did not use: after predicting 1, "
-    "5 and 10 s ahead, and over whole logs. In brackets: the error of the best simple "
-    "model. Better, worse: than that model. Cannot be told: the difference may be chance; "
-    "more logs would show which model errs less. Good up to: the error over whole logs that "
-    "is allowed, by default 2 % of travel."
+    "Rms errors{unit} on {count} unseen log{s}{lengths}, which the fit did not use: 1, 5 and 10 s "
+    "ahead, and over whole logs. In brackets: the error of the best simple model. Better, worse: "
+    "than it. Cannot be told: the difference may be chance. "
+    "Good up to: the error over whole logs that is allowed, by default 2 % of travel."
 )
+_HOLDS = "Holds for free motion with the loads, the oil temperature and the engine speed of these logs. "
+_MARKS = "✗ and ! say which rule holds, not which error is larger: compare whole logs with good up to. "
 _RULES = {
     Verdict.PREDICTS: "within the tolerance over whole logs",
     Verdict.MISFIT: "errs on the fitted logs by more than the tolerance and a simple model",
@@ -62,11 +62,11 @@ _LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted 
 Verdicts = Mapping[str, Sequence[JointVerdict]]  # by fit
 
 
-def verdict_table(fits: Verdicts) -> Table:
+def verdict_table(fits: Verdicts, lengths: str = "") -> Table:
     """Return the verdicts on each joint of each fit.
 
     Where unseen logs test a joint, its errors stand beside those of the best simple
-    model there.
+    model there. `lengths` says how long these logs are.
     """
     every = [*chain.from_iterable(fits.values())]
     count = max(verdict.unseen_logs for verdict in every)
@@ -82,7 +82,8 @@ def verdict_table(fits: Verdicts) -> Table:
     if count:
         names += [*map(column_of, JUDGED), WHOLE, FITTED, GOOD]
         optional = (GOOD, FITTED, column_of(JUDGED[1]), WHOLE)
-        note = _TESTED.format(unit=unit, count=count, s="s" if count > 1 else "")
+        s = "s" if count > 1 else ""
+        note = _TESTED.format(unit=unit, count=count, s=s, lengths=lengths)
         if count < LEAST_BLOCKS:
             note += _NO_WORD
     else:
@@ -206,12 +207,15 @@ def left_out_table(
     return Table.of(title, columns | keys, cells, note + _LEFT_OUT)
 
 
-def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
+def verdict_sections(
+    fits: Verdicts, predictions: Sequence[Prediction], *steps: Finding
+) -> tuple[Section, ...]:
     """Return the sections that every page of predictions begins with: the verdicts, and
     what to do next.
     """
-    table = verdict_table(fits)
-    table = replace(table, note=f"{_rules(fits)}{table.note} {_RIVALS}")
+    table = verdict_table(fits, _lengths(predictions))
+    note = f"{_rules(fits)}{_HOLDS}{table.note} {_RIVALS}"
+    table = replace(table, note=note)
     verdict = Section("Verdict", tables={"verdict": table})
     return (verdict, Section("Next", steps=steps)) if steps else (verdict,)
 
@@ -219,12 +223,27 @@ def verdict_sections(fits: Verdicts, *steps: Finding) -> tuple[Section, ...]:
 def _rules(fits: Verdicts) -> str:
     """Say by which rules joints have the verdicts that the table shows."""
     shown = {verdict.verdict for verdicts in fits.values() for verdict in verdicts}
+    # a joint that fails a rule may err by less than one that predicts roughly
+    marks = _MARKS if {"✗", "!"} <= {verdict.sign for verdict in shown} else ""
     said = [
         f"{verdict.capitalize()}: {rule}. "
         for verdict, rule in _RULES.items()
         if verdict in shown
     ]
-    return "".join(said)
+    return "".join(said) + marks
+
+
+def _lengths(predictions: Sequence[Prediction]) -> str:
+    """Say how long the unseen logs are that a verdict counts, as " of 20 to 25 s"."""
+    counted = {
+        prediction.log.source: prediction.log.duration
+        for prediction in predictions
+        if prediction.unseen and not prediction.apart
+    }
+    if not counted:
+        return ""
+    low, high = round(min(counted.values())), round(max(counted.values()))
+    return f" of {low} s" if low == high else f" of {low} to {high} s"
 
 
 def horizon_section(fits: Verdicts) -> Section | None:

@@ -1,11 +1,14 @@
 """Quantities of an arm by laws: ratios, gravity, symmetry, the plant, analytic dead
 bands, delays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from arms import posed, with_masses
 from conftest import replaced
 from made_logs import HYDRAULIC, TRUTH, step_log
+from report_fits import make_problem, make_uncertainty
 
 from hydroid import load_settings
 from hydroid.hydraulics.records import Records
@@ -13,7 +16,8 @@ from hydroid.hydraulics.solenoid import coil_current, resting_stroke, side_volta
 from hydroid.identified_model import IdentifiedModel, identified
 from hydroid.plant import Plant
 from hydroid.posterior.bench import Bench, Movement, make_bench
-from hydroid.posterior.quantities import actuator, joint_measure
+from hydroid.posterior.quantities import actuator, joint_measure, quantities
+from hydroid.posterior.uncertainty import uncertainty_from
 from hydroid.problem.bindings import Bindings
 from hydroid.simulation import Candidates
 
@@ -263,3 +267,23 @@ def test_quantities_are_smooth_in_the_parameters(shoulder):
         assert near == pytest.approx(far, rel=0.2, abs=2e-5 * (abs(value[2]) + 1)), (
             column.label
         )
+
+
+def test_a_quantity_is_known_from_the_logs_or_from_the_priors_as_its_parameters_are():
+    problem = make_problem(outputs=(2,), samples=200)
+    middle = (problem.parameters.lower + problem.parameters.upper) / 2
+    from_logs = make_uncertainty(problem, middle)
+    known, _ = quantities(problem, from_logs)
+    assert known
+    for quantity in known.values():
+        assert quantity.data_share == pytest.approx(1.0, abs=0.01)
+    # the logs say next to nothing, and each parameter has a prior of 20 %
+    linear = replace(
+        from_logs.linear,
+        slopes=1e-6 * from_logs.linear.slopes,
+        prior_slopes=5.0 * np.eye(len(from_logs.linear.slopes)),
+    )
+    expected, _ = quantities(problem, uncertainty_from(from_logs.likelihood, linear))
+    assert expected.keys() == known.keys()
+    for quantity in expected.values():
+        assert quantity.data_share == pytest.approx(0.0, abs=0.01)

@@ -92,14 +92,14 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
     for joint, name in ((1, "shoulder"), (2, "elbow")):
         ends = PROBLEM.logs[0].command[:, joint]
         tops = [
-            f"{word} {0.24 * abs(end):.2g} deg/s at {sign}{abs(end):.0f} %"
-            for word, sign, end in (
-                ("positive", "+", ends.max()),
-                ("negative", "−", ends.min()),
+            f"{word} {0.24 * abs(end):.2g}{unit} at {sign}{abs(end):.0f} %"
+            for word, sign, end, unit in (
+                ("positive", "+", ends.max(), " deg/s"),
+                ("negative", "−", ends.min(), ""),
             )
         ]
         said.append(f"{name} {', '.join(tops)}")
-    start = "the model's speed at the largest commands of the logs: "
+    start = "the model's speed at the logs' largest commands: "
     assert section.answer == start + "; ".join(said)
     chart = section.tabs[0].make()
     labels = {mark.label for panel in chart.panels for mark in panel.marks}

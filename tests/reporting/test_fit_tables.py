@@ -8,11 +8,13 @@ import pytest
 from linear_problem import ar1
 from report_fits import MODEL, make_fit, make_problem, make_record, make_uncertainty
 
+from hydroid import load_settings
 from hydroid.commands.fit import fit_result
 from hydroid.estimate import QuantityEstimate
 from hydroid.findings import OF_OPTIMUM, Finding
 from hydroid.fitting import verdict as verdict_of
 from hydroid.fitting.summary import summarise
+from hydroid.reporting.held_values import held_table
 from hydroid.reporting.knowledge_report import (
     error_section,
     every_quantity_section,
@@ -168,7 +170,12 @@ def test_every_quantity_of_a_compared_joint_is_in_the_table():
     summary = summarise(problem, make_fit(problem))
     made = {
         "a": QuantityEstimate(
-            label="dead time", joint=2, value=0.1, unit="s", interval=(0.08, None)
+            label="dead time",
+            joint=2,
+            value=0.1,
+            unit="s",
+            interval=(0.08, None),
+            data_share=0.6,
         ),
         "b": QuantityEstimate(
             label="of another", joint=3, value=1.0, unit="s", interval=(0.0, 2.0)
@@ -178,9 +185,10 @@ def test_every_quantity_of_a_compared_joint_is_in_the_table():
         problem.settings, summary.changed({"quantities": made})
     )
     table = section.tables["quantities"]
-    assert table.rows == (("shoulder", "dead time", "0.1", "s", "from 0.08"),)
+    source = "60 % data, 40 % prior"
+    assert table.rows == (("shoulder", "dead time", "0.1", "s", "from 0.08", source),)
     exact = quantity_table(problem.settings, summary.changed({"quantities": made}))
-    assert exact.rows == (("shoulder", "dead time", 0.1, "s", 0.08, None),)
+    assert exact.rows == (("shoulder", "dead time", 0.1, "s", 0.08, None, source),)
     none = summary.changed({"quantities": {}})
     assert every_quantity_section(problem.settings, none) is None
 
@@ -193,8 +201,8 @@ def known(label: str, value: float, half: float, **more: float) -> QuantityEstim
 
 
 def test_the_card_of_a_joint_has_both_directions_and_how_it_swings():
-    """An extrapolated quantity gives way to one that is not, and damping is stated
-    however wide its interval is."""
+    """An extrapolated quantity gives way to one that is not, damping is stated however
+    wide its interval is, and an interval that is the prior's is called so."""
     problem = make_problem()
     summary = summarise(problem, make_fit(problem))
     made = {
@@ -202,7 +210,7 @@ def test_the_card_of_a_joint_has_both_directions_and_how_it_swings():
         "shoulder_speed_100_positive": known("100 % up", 20.0, 0.01, reach=60.0),
         "shoulder_speed_100_negative": known("100 % down", 25.0, 1.0, reach=60.0),
         "shoulder_dead_time_positive": known("late up", 0.1, 0.02),
-        "shoulder_dead_time_negative": known("late down", 0.1, 0.01),
+        "shoulder_dead_time_negative": known("late down", 0.1, 0.01, data_share=0.05),
         "shoulder_gain_positive": known("vague", 1.0, 0.9),
         "shoulder_damping_ratio": known("damping", 0.1, 0.09),
     }
@@ -212,7 +220,7 @@ def test_the_card_of_a_joint_has_both_directions_and_how_it_swings():
     assert [(row[0], row[3]) for row in rows] == [
         ("50 % up", "± 10 %"),
         ("100 % down (extrapolated: the logs reach 60 %)", "± 4 %"),
-        ("late down", "± 10 %"),
+        ("late down", "± 10 % (95 % prior)"),
         ("damping", "0.010 to 0.19"),
     ]
 
@@ -311,3 +319,15 @@ def test_a_fit_whose_time_was_up_gives_no_advice_that_holds_only_of_an_optimum(
     assert said.count("--resume") == is_up
     assert said.count("time was up") == is_up
     assert "The time for the fit was up" not in said
+
+
+def test_the_settings_hold_what_no_parameter_states():
+    settings = load_settings(
+        "fit-hyd", {"hydraulics.pump_flow": 90.0, "hydraulics.bulk_modulus": 9e3}
+    )
+    rows = {row[0]: row[1:] for row in held_table(settings).rows}
+    assert rows["largest flow of the pump"] == (90.0, "L/min", "settings")
+    assert rows["supply pressure"][2] == "default"
+    # what is off, and what is a parameter, is not among them
+    assert "dead band of the pilot stage" not in rows
+    assert "transport delay of the command" not in rows

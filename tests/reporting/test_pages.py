@@ -253,12 +253,20 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
     }
     assert "Good up to: the error" in table.note
     # the page also says by which rule; of the verdicts that it shows alone
-    section = verdict_sections({"a": [one]})[0]
+    section = verdict_sections({"a": [one]}, ())[0]
     note = section.tables["verdict"].note
     assert note.startswith(
         "Cannot be told: after 1, 5 and 10 s neither better nor worse"
     )
     assert "Predicts roughly" not in note
+    # nothing of marks that differ, where there is one
+    assert "✗ and !" not in note
+    marks = {
+        verdict: one.model_copy(update={"verdict": verdict})
+        for verdict in (Verdict.ROUGHLY, Verdict.WORSE_THAN_FITTED)
+    }
+    section = verdict_sections({"a": [*marks.values()]}, ())[0]
+    assert "✗ and ! say which rule holds" in section.tables["verdict"].note
     assert lead({"a": [one]}).startswith(
         "boom: cannot be told from nine numbers (2 unseen logs)"
     )
@@ -437,3 +445,22 @@ def test_a_page_opens_on_the_first_log_whose_arm_it_shows_in_motion():
     beside = tuple(Plot("", "", dict, row=row) for row in ("c", "b"))
     assert Section("", tabs=tuple(tabs), beside=beside).chosen == tabs[2]
     assert Section("").chosen is None
+
+
+def test_the_verdict_says_how_long_the_unseen_logs_are():
+    first, second = make_problem(outputs=(2,), samples=400, sources=("a", "b")).logs
+    seen = [make_prediction(first), make_prediction(second.part(0, 200))]
+    one = JointVerdict(
+        joint=2,
+        name="shoulder",
+        verdict=Verdict.PREDICTS,
+        unseen_logs=2,
+        unseen_deg=0.1,
+        tolerance_deg=1.0,
+    )
+    verdicts = {"a": [one]}
+    note = verdict_sections(verdicts, seen)[0].tables["verdict"].note
+    assert "on 2 unseen logs of 2 to 4 s, which the fit did not use" in note
+    apart = replace(seen[1], apart=True)
+    note = verdict_sections(verdicts, [seen[0], apart])[0].tables["verdict"].note
+    assert "unseen logs of 4 s, which" in note

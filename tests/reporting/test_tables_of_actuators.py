@@ -109,7 +109,7 @@ def test_the_largest_flow_and_the_lowest_pressure_of_the_pump_have_their_log_and
     first, second = fitted(FIT)
     predictions = [with_oil(first, 1e-3, 90e5), with_oil(second, 2e-3, 120e5)]
     settings = PROBLEM.settings.changed({"hydraulics.pump_flow": 150.0})
-    section = oil_section(settings, SUMMARY, predictions)
+    section = oil_section(settings, SUMMARY, predictions, None)
     assert section is not None
     row = ("shoulder", "50", "50", "120", "b.csv", "0.1")
     assert section.tables["oil"].rows[0] == row
@@ -117,7 +117,7 @@ def test_the_largest_flow_and_the_lowest_pressure_of_the_pump_have_their_log_and
         ("pump's line", "200", "90", "a.csv", "0.1"),
     )
     assert section.answer == (
-        "the pump's line falls from 200 to 90 bar (a.csv, 0.1 s); the pump gives at most 150 L/min; "
+        "the pump gives at most 150 L/min, and its line falls from 200 to 90 bar; "
         "no log measures pressures"
     )
     # what limits them, and whether the fit says so
@@ -127,11 +127,11 @@ def test_the_largest_flow_and_the_lowest_pressure_of_the_pump_have_their_log_and
 
 def test_without_hydraulics_or_a_pump_nothing_is_said_of_them():
     first, _ = fitted(FIT)
-    assert oil_section(PROBLEM.settings, SUMMARY, [first]) is None
+    assert oil_section(PROBLEM.settings, SUMMARY, [first], None) is None
     alone = with_oil(first, 1e-3, 90e5)
     assert alone.oil is not None
     alone = replace(alone, oil=replace(alone.oil, line=None))
-    section = oil_section(PROBLEM.settings, SUMMARY, [alone])
+    section = oil_section(PROBLEM.settings, SUMMARY, [alone], None)
     assert section is not None
     assert "pump" not in section.tables
     assert section.answer.startswith("flow in up to: shoulder 60 L/min")

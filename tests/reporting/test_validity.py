@@ -44,7 +44,7 @@ def test_commands_positions_and_speeds_are_those_of_the_logs():
 def test_what_the_logs_lack_is_what_to_log_next():
     run = record_of(log_of([50.0, 30.0], [40.0, -60.0]))
     section = validity_section(run)
-    assert "valid for shoulder 0 to +50 %" in section.answer
+    assert "valid for free motion, shoulder 0 to +50 %" in section.answer
     said = " ".join(section.points)
     assert "both directions of shoulder." in said
     # the elbow's commands have one size in each direction: its valve is on or off
@@ -53,6 +53,8 @@ def test_what_the_logs_lack_is_what_to_log_next():
     assert "more unseen logs, 4 in all, to validate on. There are none." in said
     assert "several joints at once" not in said
     assert "hydroid suggest --fit RUN" in said
+    # what the model leaves out, whatever the logs cover
+    assert "Limit: oil temperature and engine speed as in the fitted logs" in said
 
 
 def test_nothing_is_asked_for_that_the_logs_have():

@@ -495,15 +495,15 @@ class Ladder:
         before = alone(last, step.joint, theta)
         step_before = step.changed(terms=step.terms[:-1])
         begun = self._far_end(before, theta, settings, step_before)
-        theta = before.parameters.from_unit(begun.point)
-        without = self._refined(make_likelihood(before), theta, settings, step_before)
-        after, begun_with = self._far_end_with(last, problem, theta, step, settings)
-        with_it = None
-        if begun_with.negative_log < begun.negative_log - LESS * before.measured.size:
-            theta = after.parameters.from_unit(begun_with.point)
-            with_it = self._refined(make_likelihood(after), theta, settings, step)
+        begun_at = before.parameters.from_unit(begun.point)
+        without = self._refined(
+            make_likelihood(before), begun_at, settings, step_before
+        )
+        enough = begun.negative_log - LESS * before.measured.size
+        after, ends = self._ends_with(last, problem, begun_at, step, settings, enough)
         if self._late:
             return _Alone()
+        with_it = min(ends, key=lambda end: end.negative_log, default=None)
         if with_it is not None and is_better(
             self._left_out_of(after, with_it),
             self._left_out_of(before, without),
@@ -512,30 +512,39 @@ class Ladder:
             return _Alone(theta=after.parameters.from_unit(with_it.point))
         return _Alone(without=before.parameters.from_unit(without.point))
 
-    def _far_end_with(
+    def _ends_with(
         self,
         last: Problem,
         problem: Problem,
         theta: Array,
         step: Step,
         settings: RefinementSettings,
-    ) -> tuple[Problem, Refinement]:
-        """Return the problem of a joint alone with another term, and where independent
-        output errors lead.
+        enough: float,
+    ) -> tuple[Problem, list[Refinement]]:
+        """Return the problem of a joint alone with another term, and its refinements
+        from where independent output errors lead, if these are less than `enough`.
 
-        It begins at theta of the last problem, (P,), where the term does nothing yet.
-        A valve's curve also begins at the speeds that the logs show: from a power law,
-        least squares seldom finds a valve that opens all at once; and from these
-        speeds, seldom one that does not.
+        One begins at theta of the last problem, (P,), where the term does nothing yet.
+        A valve's curve also begins at the speeds that the logs show, and all else of
+        the joint where the settings begin: without the curve, load and lags have stood
+        for it. Which of them leads nearer differs from valve to valve, and shows only
+        at the end.
         """
         nothing = problem.parameters.started(last.parameters.mapping(theta))
         own = alone(problem, step.joint, nothing)
-        ends = [self._far_end(own, nothing, settings, step)]
+        starts = {step: nothing}
         if _new_curves(problem, last):
-            measured = by_speeds(problem, step.joint, nothing)
-            few = settings.changed({"iterations": FIRST})
-            ends.append(self._far_end(own, measured, few, step.changed(start=2)))
-        return own, min(ends, key=lambda end: end.negative_log)
+            anew = np.where(own.parameters.free, problem.parameters.start, nothing)
+            by_logs = by_speeds(problem, step.joint, anew)
+            starts[step.changed(start=2)] = by_logs
+        ends = list[Refinement]()
+        for tried, start in starts.items():
+            far = self._far_end(own, start, settings, tried)
+            if far.negative_log < enough:
+                near = own.parameters.from_unit(far.point)
+                end = self._refined(make_likelihood(own), near, settings, tried)
+                ends.append(end)
+        return own, ends
 
     def _try_without(
         self, whole: Problem, term: str, settings: RefinementSettings

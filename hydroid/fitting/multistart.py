@@ -42,6 +42,9 @@ DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it
 shows no motion"""
+HALF = 0.5
+"""part of the lag that is before the dead band, and of the load that is compensated,
+where a start knows neither"""
 COST = itemgetter(0)  # of a negative log-likelihood and the theta that it is of
 
 
@@ -258,13 +261,17 @@ def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
     """Return theta, (P,), with the valve of a joint at the speeds that its logs show
     (`speed_curve`).
 
-    It is theta itself where its valve has no curve, or the logs show none.
+    Unlike nine numbers, it says neither that no load slows the joint, nor that its
+    lags are all behind the dead band: least squares seldom leaves either again. It is
+    theta itself where its valve has no curve, or the logs show none.
     """
     found = fitted_valve(problem.logs, joint) if has_curve(problem, joint) else None
     if found is None:
         return theta
     a, b = found.sides
-    values = {"delay": found.delay, "pilot_lag": 0.0, "opening_lag": found.lag}
+    lag = HALF * found.lag
+    values = {"delay": found.delay, "pilot_lag": lag, "opening_lag": lag}
+    values["compensation"] = HALF
     values |= _sided("dead_band", a.dead_band, b.dead_band)
     values |= _sided("opening_exponent", a.exponent, b.exponent)
     for part, name in enumerate(CURVE):

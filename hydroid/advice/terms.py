@@ -30,6 +30,10 @@ from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.log import WITH_INPUT
 from hydroid.settings.problem import ParameterSettings
 
+PLUNGER_LAG = "plunger_damping"
+"""a lag, too: no term beside those that a valve has for itself"""
+LAGS = (*TARGETS["pilot_lag"], *TARGETS["opening_lag"])
+
 
 @record
 class Term:
@@ -173,6 +177,8 @@ def _nominal(problem: Problem) -> Iterator[Term]:
         if row.span is None or not _may_lack(problem, row):
             continue
         joints = _moving(problem, row.name, problem.active_joints)
+        if row.name == PLUNGER_LAG:
+            joints = tuple(j for j in joints if taken.isdisjoint(product(LAGS, [j])))
         for quantity in dict.fromkeys((row.name, *TARGETS[row.name])):
             for group in _groups(row, quantity, joints):
                 if taken.isdisjoint(product(TARGETS[quantity], group)):

@@ -89,6 +89,12 @@ def test_terms_are_what_is_not_free(late: tuple[Problem, Uncertainty]):
             np.append(known.theta, 0.0),
         )
         assert freed & {"delay", "delay_a", "delay_b", "late_b"} == {left}
+    # a second name of what is free
+    lag = ParameterSettings(quantity="pilot_lag", joints=(2,), bounds=(0, 1))
+    lagging = problem.varied(problem.settings.with_parameters({"lag": lag}))
+    assert "plunger_damping" in names(problem)
+    assert "opening_lag" in names(lagging, np.append(known.theta, 0.0))
+    assert "plunger_damping" not in names(lagging, np.append(known.theta, 0.0))
     (log,) = problem.logs
     gauged = replace(log, pressure=np.zeros((*log.angle.shape, 2)))
     assert "start_pressure" in names(problem)

@@ -9,7 +9,7 @@ from field_logs import Truth, make_truth, text
 import hydroid
 from hydroid.errors import SettingsError
 
-pytestmark = pytest.mark.usefixtures("no_picture")
+pytestmark = pytest.mark.usefixtures("no_picture", "short_searches")
 EXCAVATOR = {"joints": "swing,boom,arm,bucket", "lengths": "0,3.7,1.6,0.9"}
 
 

@@ -6,6 +6,7 @@ import pytest
 
 import hydroid
 
+pytestmark = pytest.mark.usefixtures("no_picture", "short_searches")
 TIME = np.arange(0.0, 20.0, 0.02)
 SPEED = np.round(np.interp(TIME, [0, 5, 12, 20], [900, 2100, 1200, 1800]), 1)
 

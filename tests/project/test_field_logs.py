@@ -22,7 +22,7 @@ from hydroid.errors import LogError
 from hydroid.log import Log
 from hydroid.settings.arm import Arm, load_arm
 
-pytestmark = pytest.mark.usefixtures("no_picture")
+pytestmark = pytest.mark.usefixtures("no_picture", "short_searches")
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,8 @@ from worlds import SIZES, WORLDS, write_log
 
 import hydroid
 
+pytestmark = pytest.mark.usefixtures("short_searches")
+
 
 @pytest.mark.parametrize("name", WORLDS)
 def test_an_arm_of_the_world_is_taken_as_it_is(name: str, tmp_path: Path) -> None:

@@ -141,15 +141,7 @@ def most_likely(
     def cost(logarithms: Array) -> tuple[float, Array]:
         total = np.zeros(len(logarithms) + 1)
         for course, error in pairs:
-            total += _cost_and_slopes(
-                error,
-                course.used,
-                course.stops,
-                course.way,
-                course.period,
-                course.readings,
-                logarithms,
-            )
+            total += _cost_and_slopes(course, error, logarithms)
         return total[0], total[1:]
 
     starts = _guesses(pairs, square) if start is None else (start,)
@@ -164,6 +156,18 @@ def most_likely(
         ended.append(result)
     best = min(ended, key=lambda result: result.fun)
     return np.exp(best.x)
+
+
+def _cost_and_slopes(course: Course, error: Array, logarithms: Array) -> Array:
+    """Return the cost of an error, (T,), at logarithms of NUMBERS, (5,), and its
+    derivatives by them, in one array of shape (6,)."""
+    numbers = _around(logarithms)
+    carry, step = _models(course.period, course.way, course.stops, numbers)
+    sensor = numbers[:, 0].copy()
+    start = sensor / course.readings
+    costs = _costs(error, course.used, sensor, start, step, carry)
+    costs[1:] = (costs[1:] - costs[0]) / DIFFERENCE
+    return costs
 
 
 def _bounds(square: float, least: float, given: float) -> Array:
@@ -361,31 +365,28 @@ def _costs(
 
 
 @njit(cache=True)
-def _cost_and_slopes(
-    error: Array,
-    used: Mask,
-    stops: Mask,
-    way: Array,
-    period: float,
-    readings: float,
-    logarithms: Array,
-) -> Array:
-    """The cost of `_costs` at logarithms of NUMBERS, (5,), and its derivatives by them,
-    in one array of shape (6,)."""
-    count = len(logarithms) + 1
-    numbers = np.empty((count, len(logarithms)))
-    carry = np.empty((count, 2, len(error)))
-    step = np.empty((count, 2, len(error)))
-    for i in range(count):
+def _around(logarithms: Array) -> Array:
+    """NUMBERS at their logarithms, (5,), and with each of these changed by DIFFERENCE,
+    (6, 5)."""
+    numbers = np.empty((len(logarithms) + 1, len(logarithms)))
+    for i in range(len(numbers)):
         changed = logarithms.copy()
         if i > 0:
             changed[i - 1] += DIFFERENCE
         numbers[i] = np.exp(changed)
+    return numbers
+
+
+@njit(cache=True)
+def _models(
+    period: float, way: Array, stops: Mask, numbers: Array
+) -> tuple[Array, Array]:
+    """What `_model` returns, for n sets of NUMBERS, (n, 5): each of shape (n, 2, T)."""
+    carry = np.empty((len(numbers), 2, len(way)))
+    step = np.empty((len(numbers), 2, len(way)))
+    for i in range(len(numbers)):
         carry[i], step[i] = _model(period, way, stops, numbers[i])
-    sensor = numbers[:, 0].copy()
-    costs = _costs(error, used, sensor, sensor / readings, step, carry)
-    costs[1:] = (costs[1:] - costs[0]) / DIFFERENCE
-    return costs
+    return carry, step
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ from hydroid.words import listed
 
 OF_SPRING = ("oil_damping", "oil_damping_share")
 """quantities of a spring of oil: without its frequency they change nothing"""
+OTHER_SIDE = {"_a": "_b", "_b": "_a"}
 _HEADER = ("joint", "quantity", "value", "unit", "from")
 _NOTE = (
     "Not estimated. default: hydroid's own value. Geometry, areas and masses that are no parameters "
@@ -22,27 +23,41 @@ def held_table(settings: FitSettings) -> Table:
 
     Two sides of the same value share a row.
     """
-    rows = dict[tuple[Cell, ...], None]()
-    for name, quantity in HYDRAULIC.items():
-        joints = _held_joints(settings, name)
-        value = getattr(settings.hydraulics, name)
-        if value is None or not joints or _is_off(settings, name):
-            continue
-        side = name[-2:] if name[-2:] in ("_a", "_b") else ""
-        base = name.removesuffix(side)
-        other = base + {"_a": "_b", "_b": "_a", "": ""}[side]
-        words = quantity.plain
-        same = value == getattr(settings.hydraulics, other)
-        if side and same and joints == _held_joints(settings, other):
-            words = words.rpartition(", side")[0]
-        every = len(joints) == len(settings.outputs)
-        of = "" if every else listed([settings.arm.name_of(joint) for joint in joints])
-        source = "default" if value == quantity.default else "settings"
-        rows[of, words, Given(value), quantity.unit, source] = None
+    rows = dict.fromkeys(
+        _row(settings, name) for name in HYDRAULIC if _is_held(settings, name)
+    )
     table = Table("Held by the settings", _HEADER, tuple(rows), _NOTE)
     if not any(row[0] for row in rows):
         return replace(table, header=_HEADER[1:], rows=tuple(row[1:] for row in rows))
     return table
+
+
+def _is_held(settings: FitSettings, name: str) -> bool:
+    """Return whether settings hold a quantity of the hydraulics that changes
+    anything."""
+    if getattr(settings.hydraulics, name) is None:
+        return False
+    return bool(_held_joints(settings, name)) and not _is_off(settings, name)
+
+
+def _row(settings: FitSettings, name: str) -> tuple[Cell, ...]:
+    """Return the row of a quantity that settings hold; its side is left out where the
+    other one is held alike."""
+    quantity = HYDRAULIC[name]
+    value = getattr(settings.hydraulics, name)
+    joints = _held_joints(settings, name)
+    side = name[-2:] if name[-2:] in OTHER_SIDE else ""
+    words = quantity.plain
+    if side:
+        other = name.removesuffix(side) + OTHER_SIDE[side]
+        same_value = value == getattr(settings.hydraulics, other)
+        if same_value and joints == _held_joints(settings, other):
+            words = words.rpartition(", side")[0]
+    of = ""
+    if len(joints) < len(settings.outputs):
+        of = listed([settings.arm.name_of(joint) for joint in joints])
+    source = "default" if value == quantity.default else "settings"
+    return of, words, Given(value), quantity.unit, source
 
 
 def _is_off(settings: FitSettings, name: str) -> bool:

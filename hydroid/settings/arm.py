@@ -24,7 +24,7 @@ from hydroid.units import Display, display
 
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
-FARTHEST_BY_CYLINDER = 200.0
+FARTHEST_BY_CYLINDER = 270.0
 """how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg];
 slewing gears and rotators turn farther"""
 TIP_LOAD = "tip_load"  # name of the link that is a load at the tip

@@ -108,8 +108,8 @@ def test_the_flag_tells_what_the_logs_alone_determine(sd, share, flag, source):
 
 def test_a_quantity_that_a_change_takes_away_is_not_known_and_spoils_no_other():
     def quantities(theta: np.ndarray) -> np.ndarray:
-        # the second one has no value for smaller parameters
-        lost = np.where(theta[:, 0] < THETA[0], np.nan, theta[:, 0])
+        # the second one has no value beside the estimate
+        lost = np.where(theta[:, 0] == THETA[0], theta[:, 0], np.nan)
         return np.stack([theta[:, 0], lost], axis=1)
 
     found = known().propagate(quantities, positive=True)

@@ -16,6 +16,7 @@ from hydroid.fitting.verdict import standing_out
 from hydroid.reporting import page_file
 from hydroid.reporting.actuator_report import speed_section, step_section
 from hydroid.reporting.correlation_report import correlation_section
+from hydroid.reporting.data_report import data_section
 from hydroid.reporting.knowledge_report import (
     error_section,
     every_quantity_section,
@@ -26,6 +27,7 @@ from hydroid.reporting.knowledge_report import (
     warnings,
 )
 from hydroid.reporting.load_report import load_section
+from hydroid.reporting.model_report import model_section
 from hydroid.reporting.oil_report import oil_section
 from hydroid.reporting.page import Page, Section, short_name
 from hydroid.reporting.parameters_report import (
@@ -38,6 +40,7 @@ from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.response_report import error_table, response_section
 from hydroid.reporting.search_report import search_section
 from hydroid.reporting.shared_pump import slow_down
+from hydroid.reporting.use_report import use_section
 from hydroid.reporting.validity_report import validity_section
 from hydroid.reporting.verdict_table import (
     Verdicts,
@@ -155,6 +158,7 @@ def _fit_sections(
         quantity_section(settings, summary),
         error_section(settings, summary, run.verdict),
         validity_section(run),
+        data_section(run),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
         oil_section(settings, summary, shown, slow_down(run.model, logs)),
@@ -162,10 +166,12 @@ def _fit_sections(
         step_section(settings, summary),
         load_section(run.model, logs),
         every_quantity_section(settings, summary),
+        model_section(run),
         parameter_section(settings, summary, *further_findings(summary)),
         prior_section(settings, summary),
         correlation_section(settings, summary),
         search_section(run),
+        use_section(run),
     )
     return tuple(sorted(filter(None, sections), key=lambda section: section.folded))
 

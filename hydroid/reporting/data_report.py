@@ -8,10 +8,10 @@ import numpy as np
 from hydroid.arrays import record
 from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
-from hydroid.log.command_sizes import largest_commands
+from hydroid.log.command_sizes import HELD, largest_commands
 from hydroid.log.conditions import stated, words_of
 from hydroid.log.log import LEAST_COMMAND
-from hydroid.reporting.page import Cell, Section, Table, log_names
+from hydroid.reporting.page import Cell, Given, Section, Table, log_names
 from hydroid.run.record import FinishedRun
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import EFFECTS, log_file
@@ -26,16 +26,18 @@ STANDS = 0.2
 """motion of a joint up to which it stands [deg, mm]"""
 MOSTLY = 5.0
 """percent of the driven time that the stated range of commands leaves out below it"""
+NOTABLE = 0.005
+"""part of the time that is worth a word"""
 LEAST_GAP = 5.0
 """command from which nothing below it was driven is worth a word [%]"""
 _TEXT = (
     "Logs as their files have them; the fit resamples all to {period:g} s ({rate:.3g} Hz). Under "
-    "each joint: how far it moves, and its largest negative and positive command that lasts "
-    "0.5 s in all."
+    "each joint: how far it moves and, in brackets, its largest negative and positive command "
+    f"that lasts {HELD:g} s in all."
 )
 _NOT_STORED = (
-    "Rows, rates and what was left out are not stored of {names}: an earlier version read them. "
-    "Their samples are counted after resampling."
+    "The rows, rates and gaps of the files are not stored of {names}, which an earlier version read. "
+    "Samples are counted after resampling there."
 )
 
 
@@ -90,11 +92,18 @@ def _log_table(
         columns.append("rate [Hz]")
     if settings.payloads:
         columns.append("load [kg]")
-    columns += [settings.arm.name_of(joint) for joint in joints]
+    for joint in joints:
+        unit = settings.arm.joint(joint).shown.unit
+        columns.append(f"{settings.arm.name_of(joint)} [{unit}]")
     rows = list[tuple[Cell, ...]]()
     for log, use in zip(logs, uses, strict=True):
         samples = log.rows.count if log.rows else len(log.time)
-        row: list[Cell] = [names[log.source], use, f"{log.duration:.1f}", samples]
+        row: list[Cell] = [
+            names[log.source],
+            use,
+            Given(round(log.duration, 1)),
+            samples,
+        ]
         if has_rates:
             row.append(_rate(log))
         if settings.payloads:
@@ -110,7 +119,7 @@ def _not_stored(logs: Sequence[Log]) -> str:
     if not names:
         return ""
     return _NOT_STORED.format(
-        names="any log" if len(names) == len(logs) else listed(names, 4)
+        names="these logs" if len(names) == len(logs) else listed(names, 4)
     )
 
 
@@ -132,13 +141,13 @@ def _motion(settings: FitSettings, log: Log, joint: int) -> str:
     moved = "not measured"
     if log.measures(joint):
         travel = shown.factor * float(np.ptp(log.angle_of(joint)))
-        moved = f"{two_digits(travel)} {shown.unit}"
+        moved = two_digits(travel)
         if travel < STANDS and not log.drives(joint):
             return "stands"
     if not log.drives(joint):
-        return f"{moved}, no command"
+        return f"{moved} (no command)"
     low, high = largest_commands([log], joint)
-    return f"{moved}, {_signed(low)} to {_signed(high)} %"
+    return f"{moved} ({_signed(low)} to {_signed(high)} %)"
 
 
 def _signed(value: float) -> str:
@@ -151,11 +160,14 @@ def _points(
     """Yield what the table does not show."""
     if len(settings.outputs) > 1:
         shares = driven_together(settings, fitted)
-        yield (
-            "Joints together: in the fitted logs two or more joints are driven at once in "
-            f"{_part(shares.several)} of the time, one alone in {_part(shares.one)}, none in "
-            f"{_part(shares.none)}."
+        said = (
+            "Joints together: in the fitted logs, two or more joints are driven at once in "
+            f"{_part(shares.several)} of the time"
         )
+        for share, what in ((shares.one, "one alone"), (shares.none, "none")):
+            if share >= NOTABLE:
+                said += f", {what} in {_part(share)}"
+        yield f"{said}."
     if said := _sizes(settings, fitted):
         yield said
     yield from _left_out(logs)

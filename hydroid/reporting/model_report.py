@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 from hydroid.estimate import FitSummary
 from hydroid.fitting.step import step_of
 from hydroid.quantity_table import CHOICES, HYDRAULIC, TARGETS
-from hydroid.reporting.page import Cell, Section, Table
+from hydroid.reporting.page import Section, Table
 from hydroid.run.record import FinishedRun
 from hydroid.rungs import GAIN, RUNGS
 from hydroid.settings.fit import FitSettings
@@ -25,7 +25,6 @@ OFF: State = "off"
 IN = "in the model"
 REJECTED = "tested and rejected"
 OUT = "not in the model"
-ORDER = (IN, REJECTED, OUT)
 _TEXT = (
     "Values of what is estimated or held: “{parameters}”. hydroid suggest tests whether the logs "
     "ask for what the settings switch off or hold."
@@ -34,7 +33,12 @@ _GAIN = (
     "gain: rise of the log-likelihood of parts of the logs that were left out, ± its standard "
     "error. An effect is kept if the rise exceeds 3, and 1.64 standard errors."
 )
-_HEADER = ("effect", "state", "how")
+_TABLES = {
+    IN: ("in_the_model", "In the model", "how"),
+    REJECTED: ("tested_and_rejected", "Tested and rejected", "what it gained"),
+    OUT: ("not_in_the_model", "Not in the model", "why, and what stands for it"),
+}
+"""file, title and second column of the table of each state"""
 Gain = tuple[float | None, float | None] | None
 """what a term gained and the standard error; None: it was not refined"""
 
@@ -173,7 +177,7 @@ NEVER = (
 
 @dataclass(frozen=True)
 class Contained:
-    """An effect in a fit: its state, one of ORDER, and how it is in the model, or why
+    """An effect in a fit: its state, a key of _TABLES, and how it is in the model, or why
     not."""
 
     name: str
@@ -194,16 +198,16 @@ class _Of:
 def model_section(run: FinishedRun) -> Section:
     """Return the folded section of the effects that the model of a run contains."""
     effects = contained(run)
-    rows = list[tuple[Cell, ...]]()
-    for state in ORDER:
-        rows += [
-            (one.name, one.state, one.how) for one in effects if one.state == state
-        ]
-    tested = any(REJECTED in (one.state, *one.how.split(": ")) for one in effects)
+    tables = dict[str, Table]()
+    for state, (file, title, column) in _TABLES.items():
+        rows = tuple((one.name, one.how) for one in effects if one.state == state)
+        if rows:
+            note = _GAIN if state == REJECTED else ""
+            tables[file] = Table(title, ("effect", column), rows, note)
     return Section(
         TITLE,
         _TEXT.format(parameters=PARAMETERS),
-        tables={"effects": Table("", _HEADER, tuple(rows), _GAIN if tested else "")},
+        tables=tables,
         folded=True,
         answer=_answer(run.settings, effects),
     )
@@ -346,9 +350,9 @@ def _sides(effect: Effect) -> dict[str, None]:
 def _value(effect: Effect, places: Sequence[_Of]) -> str:
     """Write the value at which an effect of a single quantity is held; nothing where it
     has several."""
-    values = {place.value for place in places}
-    (value,) = values if len(values) == 1 else (None,)
-    if value is None or len(effect.decides) > 1:
+    value = places[0].value
+    is_shared = all(place.value == value for place in places)
+    if value is None or not is_shared or len(effect.decides) > 1:
         return ""
     unit = CHOICES[effect.decides[0]].unit
     return f" at {plain(value)} {unit}".rstrip()

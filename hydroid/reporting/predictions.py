@@ -56,8 +56,6 @@ from hydroid.words import listed, time_words
 
 MOST_LOGS = 6
 """logs that the foot of a page names"""
-FILES = "beside this page: values in estimate.yaml, tables (CSV) in tables/, the arm (MJCF) in model/"
-"""what a run folder holds for other programs, for the foot of its page"""
 SOFTWARE = ("hydroid", "mujoco", "numpy", "python")
 """whose versions stand at the foot of a page"""
 
@@ -207,21 +205,15 @@ def _search_data(run: FinishedRun) -> dict[str, str]:
 
 
 def _made_from(run: FinishedRun) -> tuple[str, ...]:
-    """Return the logs, settings, seed, time, date and files of a fit, for the foot of its page."""
+    """Return the logs, settings, seed, time and date of a fit, for the foot of its
+    page."""
     logs = [prediction.log.source for prediction in run.result.fitted]
     settings = f"settings: config.yaml in {run.folder}, model {run.summary.final}"
     if run.settings.stage == "hyd":
         settings += f" ({run.settings.simulation.model})"
-    seconds = sum(prediction.log.duration for prediction in run.result.fitted)
-    count = len(dict.fromkeys(logs))
-    counted = f"{count} log{'s' if count > 1 else ''}, {seconds:.0f} s of data"
-    period = run.settings.log.period_s
-    sampled = f"{counted}, resampled every {period:g} s ({1.0 / period:.3g} Hz)"
-    fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
-    made_from = [fitted_to, settings, f"seed {run.seed}"]
+    made_from = [f"Fitted to {_log_list(logs)}", settings, f"seed {run.seed}"]
     if run.seconds:
         made_from.append(f"took {time_words(sum(run.seconds.values()))}")
     if date := run.identity.get("finished"):
         made_from.append(str(date))
-    made_from.append(FILES)
     return tuple(made_from)

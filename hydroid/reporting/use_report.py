@@ -39,7 +39,7 @@ _MODEL_FILES = {
 _HEADER = (
     "joint",
     "command in files",
-    "a positive command [%]",
+    "positive command",
     "angle in files",
     "range",
 )
@@ -161,7 +161,8 @@ def _steps(run: FinishedRun) -> Iterator[Finding]:
     name = run.settings.arm.name_of(run.settings.outputs[0])
     lines = (
         "import hydroid",
-        f"predicted = hydroid.simulate({log!r}, fit={run.folder!r}).log  # .time [s], .angle [rad]",
+        f"predicted = hydroid.simulate({log!r}, fit={run.folder!r}).log",
+        "predicted.time, predicted.angle  # [s], [rad]",
         f"plant = hydroid.load_plant({run.folder!r})",
         f"angle = plant.step({{{name!r}: 50}})  # of all joints, one sample later [rad]",
     )

@@ -240,6 +240,9 @@ class FitSummary(Settings):
     logs"""
     estimates: dict[str, NamedEstimate] = {}
     """by name; the first is the search's own"""
+    tried: dict[str, tuple[float | None, float | None] | None] = {}
+    """what each term of a single joint gained, as `gained` of an estimate, on that joint
+    alone; null: it was not refined, as it promised too little or noise alone was left"""
     quantities: dict[str, QuantityEstimate] = {}
     """what follows from the final estimate, by name"""
     curves: dict[str, CurveEstimate] = {}

@@ -3,6 +3,7 @@ last estimate."""
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import field
 
 import numpy as np
 
@@ -32,6 +33,7 @@ class Fit:
             fitted alone (0: all together).
         uncertainty: of the final estimate.
         quantities: of the final estimate.
+        tried: what the terms of single joints gained (`Ladder.tried`).
         seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a
             resumed fit, since it was resumed.
     """
@@ -46,6 +48,9 @@ class Fit:
     uncertainty: Uncertainty
     quantities: Quantities
     seconds: Mapping[str, float]
+    tried: Mapping[str, tuple[float, float] | None] = field(
+        default_factory=dict[str, tuple[float, float] | None]
+    )
 
     @property
     def refinement(self) -> Refinement | None:
@@ -111,6 +116,7 @@ def fit(
         about,
         determined,
         dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True)),
+        ladder.tried,
     )
 
 

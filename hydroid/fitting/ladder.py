@@ -2,7 +2,7 @@
 it than the last one.
 
 A rung is kept where it foretells parts of the logs that it has not seen better than the
-one below, by more than the uncertainty of that (`left_out.is_better`). Which rung that
+one below, by more than the uncertainty of that (`left_out.is_clear`). Which rung that
 is shows long before least squares has converged, so that ends early on the way
 (`FIRM`). What is kept at the end is refined to the tolerance of the settings,
 after least squares has also tried it from elsewhere (`Ladder._begin_anew`).
@@ -20,7 +20,6 @@ from hydroid.fitting.left_out import (
     LEAST_GAIN,
     LeftOut,
     gain,
-    is_better,
     is_clear,
     predict_blocks,
 )
@@ -131,6 +130,10 @@ class Ladder:
         kept: that estimate.
         estimates: all, by name.
         refinements: by the estimate that each gave.
+        tried: by how much each term of one joint foretells parts of the logs left out
+            better on that joint alone, and the standard error of that (`left_out.gain`);
+            None: it was not refined, as it promises too little or noise alone is left.
+            A term that was dropped later has what it gained there, of all joints.
     """
 
     def __init__(
@@ -143,6 +146,7 @@ class Ladder:
         self.problem = problem
         self.estimates = estimates
         self.refinements = dict[str, Refinement]()
+        self.tried = dict[str, tuple[float, float] | None]()
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch = watch
         self._checkpoints = checkpoints
@@ -439,6 +443,8 @@ class Ladder:
             tried = step.changed(terms=(*step.terms, term), joint=joint)
             own = whole.varied(whole.settings.of_estimate(tried.estimate))
             if not self._promises(own, problem, theta, joint):
+                if not self._late:
+                    self.tried[term] = None
                 continue
             among = len(lone)
             alone_with = self._alone(problem, own, theta, tried, settings, among)
@@ -503,13 +509,16 @@ class Ladder:
         after, ends = self._ends_with(last, problem, begun_at, step, settings, enough)
         if self._late:
             return _Alone()
+        term = step.terms[-1]
+        self.tried[term] = None
         with_it = min(ends, key=lambda end: end.negative_log, default=None)
-        if with_it is not None and is_better(
-            self._left_out_of(after, with_it),
-            self._left_out_of(before, without),
-            among,
-        ):
-            return _Alone(theta=after.parameters.from_unit(with_it.point))
+        if with_it is not None:
+            gained = gain(
+                self._left_out_of(after, with_it), self._left_out_of(before, without)
+            )
+            self.tried[term] = gained
+            if is_clear(*gained, among):
+                return _Alone(theta=after.parameters.from_unit(with_it.point))
         return _Alone(without=before.parameters.from_unit(without.point))
 
     def _ends_with(
@@ -567,7 +576,9 @@ class Ladder:
         )
         with_it = self._left_out_of(self.problem, self.refinements[self.kept.name])
         without = self._left_out_of(own, result)
-        if not self._late and not is_better(with_it, without):
+        gained = gain(with_it, without)
+        if not self._late and not is_clear(*gained):
+            self.tried[term] = gained
             self._keep(own, self._measured(own, result, step), step)
 
     def _is_at_end(self) -> bool:

@@ -74,6 +74,10 @@ def summarise(problem: Problem, fit: Fit) -> FitSummary:
             "diverged": int(diverged),
             "findings": (*fit_findings(fit), *known.findings),
             "estimates": estimates,
+            "tried": {
+                term: gained and finite_ends(np.array(gained))
+                for term, gained in fit.tried.items()
+            },
             "quantities": scalars,
             "curves": curves,
         }

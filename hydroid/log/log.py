@@ -23,6 +23,22 @@ LEVELS: tuple[Level, ...] = ("error", "warning", "note")
 
 
 @record
+class FileRows:
+    """The rows of a file that a log was made of, before they were resampled.
+
+    Attributes:
+        count: their number.
+        steps: the shortest, the usual and the longest step between them [s].
+        left_out: what of the whole file was left out, filled or split, one statement
+            each.
+    """
+
+    count: int
+    steps: tuple[float, float, float]
+    left_out: tuple[str, ...] = ()
+
+
+@record
 class Log:
     """What was commanded and what was measured, T samples of J joints.
 
@@ -47,6 +63,7 @@ class Log:
             it has neither.
         clock: time of day at which the recording begins, HH:MM:SS; empty where the file
             has none.
+        rows: of its file; None: it is from no file, or a part of what a file gave.
     """
 
     source: str
@@ -61,6 +78,7 @@ class Log:
     begin: float = 0.0
     clock: str = ""
     conditions: Array | None = None
+    rows: FileRows | None = None
 
     @property
     def joints(self) -> int:
@@ -194,6 +212,7 @@ class Log:
             command=self.command[samples],
             angle=self.angle[samples],
             rest=0,
+            rows=None,
         )
         if self.pressure is not None:
             part = replace(part, pressure=self.pressure[samples])

@@ -26,6 +26,10 @@ from hydroid.settings.log import LogSettings
 DEFAULT = LogSettings()
 LONGEST_NAME = 1000
 """letters of a column's name"""
+LEFT_OUT = frozenset(
+    ("cut end", "gap", "lost", "repair", "row left out", "slower channel", "work")
+)
+"""kinds of findings about what of a file is left out, filled or split"""
 
 
 @record
@@ -225,6 +229,7 @@ def _parts(
 ) -> list[Log]:
     """Return the parts of a recording between its gaps as logs."""
     pieces = [*between_gaps(recording, settings, findings, repair=repair)]
+    left_out = tuple(_statement(one) for one in findings if one.kind in LEFT_OUT)
     parts = list[Log]()
     for number, piece in enumerate(pieces, 1):
         log = resample(piece, settings, joints)
@@ -232,7 +237,13 @@ def _parts(
         # after a gap the arm may be moving
         rest = 0 if begin else None
         source = log.source if len(pieces) == 1 else f"{log.source}[{number}]"
-        parts.append(
-            replace(log, source=source, begin=begin, rest=rest, clock=recording.clock)
-        )
+        rows = log.rows and replace(log.rows, left_out=left_out)
+        place = {"source": source, "begin": begin, "rest": rest}
+        parts.append(replace(log, **place, clock=recording.clock, rows=rows))
     return parts
+
+
+def _statement(finding: LogFinding) -> str:
+    """Return what a finding states and where in its file, without the file's name."""
+    where = finding.where.removeprefix(finding.source).removeprefix(", ")
+    return ": ".join(filter(None, (where, finding.what)))

@@ -18,7 +18,7 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log.conditions import relative
-from hydroid.log.log import Log, LogFinding
+from hydroid.log.log import FileRows, Log, LogFinding
 from hydroid.log.rates import LEAST_EMPTY, join_rates
 from hydroid.log.table import Recording, Signal, number
 from hydroid.settings.log import LogSettings
@@ -51,7 +51,7 @@ def sample_period(time: Array) -> float:
     rising = steps[steps > 0]
     if not len(rising):
         return np.nan
-    return np.median(rising)
+    return float(np.median(rising))
 
 
 def unwrap(recording: Recording, findings: list[LogFinding]) -> Recording:
@@ -337,6 +337,8 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
     rows = np.minimum(rows, last)
     recorded = np.zeros(len(grid), dtype=bool)
     recorded[rows] = True
+    steps = np.diff(recording.time)
+    ends = float(steps.min()), sample_period(recording.time), float(steps.max())
     return Log(
         source=recording.table.source,
         time=grid,
@@ -346,6 +348,7 @@ def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:
         pressure=pressure,
         conditions=relative(recording, grid, time),
         recorded=None if recorded.all() else recorded,
+        rows=FileRows(len(steps) + 1, ends),
     )
 
 

@@ -11,19 +11,22 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Mapping, Sequence
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from hydroid.arrays import Array
 from hydroid.files import fill_template, write_atomic
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.page import Page, Table, short_name
 from hydroid.words import distinct
+
+_QUOTED = re.compile("“([^”]+)”")
 
 
 def write_page(page: Page, out: Path) -> Path:
@@ -108,15 +111,37 @@ def html(page: Page) -> str:
     if charts:
         scripts.append(_library())
         packed_library = _packed_library()
+    titles = [section.title for section in page.sections]
     return fill_template(
         "reporting/template.html.j2",
         page=page,
         charts=charts,
         content=_packed(text),
+        linked=partial(_linked, titles),
         script=_script(),
         packed_library=packed_library,
         policy=_policy(*scripts),
     )
+
+
+def _linked(titles: Sequence[str], text: str) -> Markup:
+    """Return a text as HTML in which a quoted title of a section, or its beginning,
+    leads to the section."""
+    parts = _QUOTED.split(text)
+    linked = Markup()
+    for place, part in enumerate(parts):
+        # the pattern's group stands at every second place
+        if place % 2 == 0:
+            linked += escape(part)
+            continue
+        quoted = escape(f"“{part}”")
+        for number, title in enumerate(titles, 1):
+            if title.startswith(part):
+                link = Markup('<a href="#section-{}">{}</a>')
+                quoted = link.format(number, quoted)
+                break
+        linked += quoted
+    return linked
 
 
 def _policy(*scripts: str) -> str:

@@ -16,6 +16,7 @@ from hydroid.fitting.verdict import standing_out
 from hydroid.reporting import page_file
 from hydroid.reporting.actuator_report import speed_section, step_section
 from hydroid.reporting.correlation_report import correlation_section
+from hydroid.reporting.data_report import data_section
 from hydroid.reporting.knowledge_report import (
     error_section,
     every_quantity_section,
@@ -26,6 +27,7 @@ from hydroid.reporting.knowledge_report import (
     warnings,
 )
 from hydroid.reporting.load_report import load_section
+from hydroid.reporting.model_report import model_section
 from hydroid.reporting.oil_report import oil_section
 from hydroid.reporting.page import Page, Section, short_name
 from hydroid.reporting.parameters_report import (
@@ -38,6 +40,7 @@ from hydroid.reporting.residual_report import residual_section
 from hydroid.reporting.response_report import error_table, response_section
 from hydroid.reporting.search_report import search_section
 from hydroid.reporting.shared_pump import slow_down
+from hydroid.reporting.use_report import use_section
 from hydroid.reporting.validity_report import validity_section
 from hydroid.reporting.verdict_table import (
     Verdicts,
@@ -53,8 +56,6 @@ from hydroid.words import listed, time_words
 
 MOST_LOGS = 6
 """logs that the foot of a page names"""
-FILES = "beside this page: values in estimate.yaml, tables (CSV) in tables/, the arm (MJCF) in model/"
-"""what a run folder holds for other programs, for the foot of its page"""
 SOFTWARE = ("hydroid", "mujoco", "numpy", "python")
 """whose versions stand at the foot of a page"""
 
@@ -155,6 +156,7 @@ def _fit_sections(
         quantity_section(settings, summary),
         error_section(settings, summary, run.verdict),
         validity_section(run),
+        data_section(run),
         unknown_section(settings, summary),
         residual_section(settings, summary, fitted),
         oil_section(settings, summary, shown, slow_down(run.model, logs)),
@@ -162,10 +164,12 @@ def _fit_sections(
         step_section(settings, summary),
         load_section(run.model, logs),
         every_quantity_section(settings, summary),
+        model_section(run),
         parameter_section(settings, summary, *further_findings(summary)),
         prior_section(settings, summary),
         correlation_section(settings, summary),
         search_section(run),
+        use_section(run),
     )
     return tuple(sorted(filter(None, sections), key=lambda section: section.folded))
 
@@ -201,21 +205,15 @@ def _search_data(run: FinishedRun) -> dict[str, str]:
 
 
 def _made_from(run: FinishedRun) -> tuple[str, ...]:
-    """Return the logs, settings, seed, time, date and files of a fit, for the foot of its page."""
+    """Return the logs, settings, seed, time and date of a fit, for the foot of its
+    page."""
     logs = [prediction.log.source for prediction in run.result.fitted]
     settings = f"settings: config.yaml in {run.folder}, model {run.summary.final}"
     if run.settings.stage == "hyd":
         settings += f" ({run.settings.simulation.model})"
-    seconds = sum(prediction.log.duration for prediction in run.result.fitted)
-    count = len(dict.fromkeys(logs))
-    counted = f"{count} log{'s' if count > 1 else ''}, {seconds:.0f} s of data"
-    period = run.settings.log.period_s
-    sampled = f"{counted}, resampled every {period:g} s ({1.0 / period:.3g} Hz)"
-    fitted_to = f"Fitted to {_log_list(logs)}: {sampled}"
-    made_from = [fitted_to, settings, f"seed {run.seed}"]
+    made_from = [f"Fitted to {_log_list(logs)}", settings, f"seed {run.seed}"]
     if run.seconds:
         made_from.append(f"took {time_words(sum(run.seconds.values()))}")
     if date := run.identity.get("finished"):
         made_from.append(str(date))
-    made_from.append(FILES)
     return tuple(made_from)

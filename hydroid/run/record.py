@@ -29,13 +29,14 @@ from hydroid.files import write_atomic
 from hydroid.fitting.fit import Fit
 from hydroid.fitting.validation import Prediction
 from hydroid.fitting.verdict import Baselines, judge
-from hydroid.identified_model import IdentifiedModel, read_identified
+from hydroid.identified_model import CONFIG, IdentifiedModel, read_identified
 from hydroid.joint_verdict import JointVerdict
 from hydroid.log import Log
 from hydroid.progress import LOGGER
 from hydroid.run.archive import pack, unpack
 from hydroid.run.folder import RunFolder, difference, samples
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.load import load
 from hydroid.settings.log import log_file
 from hydroid.words import numbered
 
@@ -97,6 +98,8 @@ class FinishedRun:
     its logs, and what it has found.
 
     After a joint refinement every parameter that was refined is free in the settings.
+    Those are of the final estimate; `begun` are the settings with all terms that the fit
+    could have added, None where these are the same.
     """
 
     folder: str
@@ -105,6 +108,7 @@ class FinishedRun:
     summary: FitSummary
     result: FitRecord
     validations: Mapping[str, Prediction]
+    begun: FitSettings | None = None
 
     @property
     def model(self) -> IdentifiedModel:
@@ -261,6 +265,7 @@ def load_record(folder: str | Path) -> FinishedRun:
         summary=model.summarise(),
         result=replace(result, fitted=tuple(fitted[:count])),
         validations=dict(zip(unseen, fitted[count:], strict=True)),
+        begun=load(path / CONFIG, FitSettings),
     )
 
 

@@ -217,6 +217,20 @@ def test_samples_decide_whether_a_log_is_unseen(run: Path):
     assert len(load_record(run).validations) == 1
 
 
+def test_a_run_without_the_rows_of_its_files_is_still_read(run: Path):
+    """Earlier versions did not store them."""
+    (fitted,) = load_record(run).result.fitted
+    lines = (run.parent / "a.csv").read_text().splitlines()
+    assert fitted.log.rows.count == len(lines) - 1
+    tree = unpack(run / RESULT)
+    for one in tree["fitted"]:
+        del one["log"]["rows"]
+    (run / RESULT).write_bytes(pack(tree))
+    (earlier,) = load_record(run).result.fitted
+    assert earlier.log.rows is None
+    np.testing.assert_array_equal(earlier.log.angle, fitted.log.angle)
+
+
 def test_validations_of_one_name_are_kept_and_a_copy_counts_once(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -8,6 +8,7 @@ from recovery import settings_of
 
 from hydroid.commands.progress import FitProgress
 from hydroid.fitting.fit import Silent, fit
+from hydroid.fitting.left_out import is_clear
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
 from hydroid.settings.search import MultistartSettings, RefinementSettings
@@ -133,6 +134,12 @@ def test_a_curve_and_a_pump_do_not_stand_in_for_each_other(name):
     exact = simulate_log(machine, log, known)
     found = fit(Problem(ladder, [noisy(exact, 0.02, 1, exact_start=False)]))
     assert found.final == name
+    # what the term of a joint gained there is known, whether it was kept or not
+    gained = found.tried["curve_shoulder"]
+    if name == "refined+curve_shoulder":
+        assert is_clear(*gained, among=1)
+    else:
+        assert gained is None or not is_clear(*gained)
 
 
 class Hurried(Silent):

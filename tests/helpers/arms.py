@@ -14,6 +14,12 @@ from hydroid.settings.arm import Arm, load_arm
 MODELS = Path(__file__).parents[1] / "models"
 BOOM = (MODELS / "boom.xml").read_text()
 """two joints, a hook that is fixed to the boom, no cylinders"""
+CRANE = """<mujoco model="crane"><worldbody><body name="mast" pos="0 0 1">
+  <joint name="luff" axis="0 -1 0" range="0 80"/>
+  <inertial pos="1 0 0" mass="100" diaginertia="1 30 30"/>
+  <body name="inner" pos="2 0 0"><joint name="telescope" type="slide" axis="1 0 0" range="0 3"/>
+    <inertial pos="1 0 0" mass="50" diaginertia="1 10 10"/></body></body></worldbody></mujoco>"""
+"""a mast that luffs, and a telescope on it, no cylinders"""
 CYLINDER = {"kind": "linear", "area_a": 5000, "area_b": 3000, "max_opening": 20}
 FOUR_BAR = {
     "ground": 0.35,

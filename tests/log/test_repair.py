@@ -166,6 +166,13 @@ def test_a_gap_splits_a_log_and_only_what_is_lost_is_left_out(tmp_path: Path) ->
         np.testing.assert_array_equal(part.angle, whole.angle[first:end])
     # the arm may be moving there
     np.testing.assert_array_equal(parts[1].start, whole.angle[103])
+    # each part says what its file had, and what was left out of it
+    for part in parts:
+        assert part.rows.count == len(part.time)
+        np.testing.assert_allclose(part.rows.steps, 0.01, atol=1e-9)
+        (statement,) = part.rows.left_out
+        assert statement == f"line 102, column time_s: {gap.what}"
+        assert part.part(0, 20).rows is None
 
 
 def test_parts_shorter_than_half_a_second_are_left_out_and_counted(
@@ -185,7 +192,10 @@ def test_a_gap_that_is_short_against_the_new_period_does_not_split(
 ) -> None:
     path, _ = dropped(tmp_path, (100, 110))
     coarse = SETTINGS.changed({"period_s": 0.05})
-    assert len(check_parts(path, coarse, RANGES)[0]) == 1
+    (one,) = check_parts(path, coarse, RANGES)[0]
+    # the rows are those of the file, before it was resampled
+    assert one.rows.count == 390
+    np.testing.assert_allclose(one.rows.steps, [0.01, 0.01, 0.11], atol=1e-9)
     assert len(check_parts(path, SETTINGS, RANGES, Reading(repair=True))[0]) == 1
 
 

@@ -42,7 +42,7 @@ def make_settings(**hydraulics: float) -> FitSettings:
 
 
 def make_log(settings: FitSettings, noise_deg: float = 0.1) -> Log:
-    return noisy(stepped(settings, TRUTH, LEVELS), noise_deg, 1)
+    return noisy(stepped(settings, TRUTH, LEVELS, 0.5), noise_deg, 1)
 
 
 def at_truth(truth: FitSettings, model: FitSettings) -> tuple[Problem, Uncertainty]:

@@ -175,7 +175,10 @@ def test_a_fit_simulates_whole_samples_or_parts_of_one(
     tmp_path: Path, between: float, period: float
 ) -> None:
     log = tmp_path / "a.csv"
-    np.savetxt(log, between * np.arange(50), header="time_s", comments="")
+    rows = between * np.arange(50)
+    np.savetxt(
+        log, np.stack([rows, rows], 1), "%.6g", ",", header="time_s,q1_deg", comments=""
+    )
     settings = LogSettings.model_validate({"time": {"column": "time_s", "unit": "s"}})
     assert simulation_period(open_table(log), settings) == pytest.approx(period)
 

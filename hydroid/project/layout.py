@@ -27,7 +27,12 @@ from hydroid.progress import Progress, no_progress
 from hydroid.project.columns import column_lines
 from hydroid.project.logs import Others, reach_of, read_first, read_others
 from hydroid.project.mirrored import mirror_sensors, of_other_sign
-from hydroid.project.section import given_section, guessed_section, missing_column
+from hydroid.project.section import (
+    given_section,
+    guessed_section,
+    missing_column,
+    simulation_period,
+)
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
 from hydroid.settings.log import EFFECTS, Input, LogSettings
@@ -118,7 +123,10 @@ def find_layout(
     others = others or Others()
     if given is not None:
         guess = _given(table, arm, given)
-        return _seen(table, arm, guess, others, GIVEN, progress)
+        layout = _seen(table, arm, guess, others, GIVEN, progress)
+        if "period_s" not in given.model_fields_set:
+            _set_period(layout, table)
+        return layout
     guess = guessed_section(table, arm, order)
     if guess.mirrored:
         # sensors without a scale: what one log reaches is not all of their range
@@ -128,7 +136,16 @@ def find_layout(
     if missing:
         return _skeleton(table, arm, guess, missing)
     guess = _of_all_logs(table, guess, others, progress)
-    return _seen(table, arm, guess, others, GUESSED, progress)
+    layout = _seen(table, arm, guess, others, GUESSED, progress)
+    _set_period(layout, table)
+    return layout
+
+
+def _set_period(layout: Layout, table: Table) -> None:
+    """Set the period of a fit's simulation: where valves open, and how soon joints
+    follow, has been seen at a finer one."""
+    settings = validate(layout.section, LogSettings, table.source)
+    layout.section["period_s"] = simulation_period(table, settings)
 
 
 def _of_all_logs(

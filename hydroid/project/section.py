@@ -16,7 +16,13 @@ from hydroid.settings.log import ColumnMap, Kind, LogSettings
 from hydroid.units import UNITS
 
 KINDS: tuple[Kind, ...] = ("command", "angle", "pressure")
-PERIOD = 0.02  # of a simulation of quick logs [s]
+PERIOD = 0.02
+"""at which `init` looks at quick logs [s]"""
+SHORTEST_PERIOD = 0.03
+"""of a simulation [s]: what faster logs show besides is not seen on such machines, and
+a fit takes half the time or less"""
+LONGEST_PERIOD = 0.07
+"""of a simulation [s]: a joint's lever changes in a step"""
 
 
 def guessed_section(
@@ -98,14 +104,22 @@ def _place(names: Sequence[str], joint: str) -> int | None:
 
 
 def _period(period: float) -> float:
-    """Return the period of a simulation [s] for a log's.
-
-    A slow log is simulated in two steps a sample;
-    what a fast one adds is not seen on such machines.
-    """
+    """Return the period [s] at which `init` looks at a log of another one: finer, where
+    the log is slow, to see when joints begin to move."""
     if period < 0.03:
         return max(period, PERIOD)
     return PERIOD if period < 0.1 else 0.05
+
+
+def simulation_period(table: Table, settings: LogSettings) -> float:
+    """Return the period of a simulation of a log [s]: that of 1, 2, 4 ... samples, or a
+    half, a quarter ... of it."""
+    period = _sample_time(table, settings)
+    while period >= LONGEST_PERIOD:
+        period = period / 2
+    while period < SHORTEST_PERIOD:
+        period = 2 * period
+    return period
 
 
 def given_section(table: Table, arm: Arm, given: LogSettings) -> Plain:
@@ -137,9 +151,10 @@ def _joint_entry(given: LogSettings, joint: int) -> Plain:
     return entry
 
 
-def _sample_time(table: Table, given: LogSettings) -> float:
+def _sample_time(table: Table, settings: LogSettings) -> float:
     """Return the usual time between samples of a log [s]."""
-    time = Signal(given.time.column, "time", gain=UNITS[given.time.unit].factor)
+    column = settings.time
+    time = Signal(column.column, "time", gain=UNITS[column.unit].factor)
     (times,) = table.read([time]).values.T
     return nearest_period(usual_step(times))
 

@@ -506,14 +506,16 @@ def is_right(parts: list[Log], truth: Truth, lost: float) -> bool:
     read = 0.0
     for part in parts:
         begin = getattr(part, "begin", 0.0)
-        rows = np.minimum(
-            np.rint((begin + part.time) / PERIOD).astype(int), len(truth.time) - 1
-        )
+        last = len(truth.time) - 1
+        rows = np.minimum(np.rint((begin + part.time) / PERIOD).astype(int), last)
+        # those that a longer period averages
+        together = [
+            np.minimum(rows + k, last) for k in range(round(part.period / PERIOD))
+        ]
         read += part.duration
         for number, name in enumerate(JOINTS):
-            size = np.abs(
-                np.abs(part.command[:, number]) - np.abs(truth.command[name][rows])
-            )
+            wanted = np.mean([truth.command[name][row] for row in together], axis=0)
+            size = np.abs(np.abs(part.command[:, number]) - np.abs(wanted))
             off = np.abs(np.degrees(part.angle[:, number]) - truth.angle[name][rows])
             # a command averaged over a lost or doubled row may differ for a sample
             if np.quantile(size, 0.99) > CLOSE_COMMAND or not off.max() <= CLOSE_ANGLE:

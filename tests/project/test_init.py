@@ -21,10 +21,13 @@ from typer.testing import CliRunner
 import hydroid
 from hydroid.commands.app import app
 from hydroid.errors import LogError, ModelError, SettingsError
+from hydroid.log import open_table
 from hydroid.project.project import Project
+from hydroid.project.section import simulation_period
 from hydroid.settings.arm import load_arm
 from hydroid.settings.cylinder import LinearActuator
 from hydroid.settings.fit import FitSettings
+from hydroid.settings.log import LogSettings
 
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
 EXAMPLE = runpy.run_path(str(URDF / "make_example.py"))
@@ -164,6 +167,22 @@ def test_a_project_is_replaced_if_that_is_asked_for(tmp_path: Path):
     }
 
 
+@pytest.mark.parametrize(
+    ("between", "period"),
+    [(0.001, 0.032), (0.01, 0.04), (0.02, 0.04), (0.05, 0.05), (0.1, 0.05)],
+)
+def test_a_fit_simulates_whole_samples_or_parts_of_one(
+    tmp_path: Path, between: float, period: float
+) -> None:
+    log = tmp_path / "a.csv"
+    rows = between * np.arange(50)
+    np.savetxt(
+        log, np.stack([rows, rows], 1), "%.6g", ",", header="time_s,q1_deg", comments=""
+    )
+    settings = LogSettings.model_validate({"time": {"column": "time_s", "unit": "s"}})
+    assert simulation_period(open_table(log), settings) == pytest.approx(period)
+
+
 @pytest.mark.usefixtures("short_searches")
 def test_a_telescopes_column_is_its_own(tmp_path: Path):
     """Columns in m go to the joint that slides; a bucket that nothing names is asked
@@ -207,7 +226,8 @@ def test_a_telescopes_column_is_its_own(tmp_path: Path):
         for line in made.columns
     )
     (log,) = hydroid.read_logs(tmp_path / "a.csv", settings)
-    assert np.ptp(log.angle[:, 2]) == pytest.approx(0.4 * np.ptp(way), rel=1e-3)
+    wanted = 0.3 + 0.4 * np.interp(log.time, time, way)
+    np.testing.assert_allclose(log.angle[:, 2], wanted, atol=1e-4)
     actuator = settings.arm.joints[2].actuator
     assert actuator.length(1.0) - actuator.length(0.25) == pytest.approx(0.75)
     assert not any("OTHER" in step for step in made.commands if " check " in step)

@@ -27,6 +27,7 @@ from hydroid.hydraulics.kernel import Plugin, make_pad, source_key
 from hydroid.hydraulics.pump import centre_left, delivery, lowest, past_valves
 from hydroid.rungs import Rung
 from hydroid.simulation.laws import LAWS
+from hydroid.simulation.rollout import call_compiled
 from hydroid.simulation.steady import false_position, illinois, steady_opening
 
 FULL_COMMAND = 100.0  # [%]
@@ -283,4 +284,4 @@ def _call(rung: Rung, plugin: Plugin, poses: Poses, *arguments: Any) -> None:
         endless["pump_flow"] = np.inf
         plugin = plugin._replace(coefficients=endless)
     law = LAWS[rung]
-    _compiled(law.rod, law.reaches)(plugin, poses, *arguments)
+    call_compiled(_compiled(law.rod, law.reaches), plugin, poses, *arguments)

@@ -352,7 +352,7 @@ def _value(effect: Effect, places: Sequence[_Of]) -> str:
     has several."""
     value = places[0].value
     is_shared = all(place.value == value for place in places)
-    if value is None or not is_shared or len(effect.decides) > 1:
+    if value is None or not is_shared or effect.decides[1:]:
         return ""
     unit = CHOICES[effect.decides[0]].unit
     return f" at {plain(value)} {unit}".rstrip()
@@ -403,7 +403,7 @@ def _motion(run: FinishedRun) -> Iterator[Contained]:
     settings = run.settings
     name = "inertia of the links"
     if not settings.rung.at_once:
-        yield Contained(name, IN, "of masses and shapes")
+        yield Contained(name, IN, "from the masses and shapes of the links")
         return
     others = [
         rung.name
@@ -514,7 +514,9 @@ def _answer(settings: FitSettings, effects: Sequence[Contained]) -> str:
         return listed([settings.arm.name_of(place.joint) for place in joints])
 
     answers = [f"dry friction: {said(FRICTION)}"]
-    if settings.stage == "hyd":
+    if settings.stage == "mech":
+        answers.append("hydraulics: one gain")
+    else:
         answers += [f"compressible oil: {said(OIL)}", f"pump saturates: {said(PUMP)}"]
     if SHARED in by_name:
         state = by_name[SHARED].state

@@ -131,7 +131,7 @@ def test_a_fit_of_stage_1_lacks_all_hydraulics_in_one_row():
     assert lacked.state == OUT
     assert not {OIL.name, PUMP.name} & {one.name for one in effects}
     assert by_name(RECORD)["torque in proportion to the command"].how == "estimated"
-    assert model_section(RECORD).answer == "dry friction: no"
+    assert model_section(RECORD).answer == "dry friction: no; hydraulics: one gain"
 
 
 def test_every_state_has_a_table_and_none_is_empty():

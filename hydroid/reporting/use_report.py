@@ -46,8 +46,8 @@ _HEADER = (
 )
 _NOTE = (
     "Files have the columns, units and signs of the fitted logs, and the time in the column "
-    "{time}, in {unit}. Positive is what the model and Python call so. Python takes commands in %, "
-    "and returns angles in rad, positions in m, pressures in Pa."
+    "{time}, in {unit}. Positive: as the model and Python have it, after the scale of this table. "
+    "Python takes commands in %, and returns angles in rad, positions in m, pressures in Pa."
 )
 
 

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from hydroid.settings.load import Settings
 from hydroid.units import Display, display
+from hydroid.words import two_digits
 
 
 class Verdict(StrEnum):
@@ -121,4 +122,8 @@ class JointVerdict(Settings):
     @property
     def text(self) -> str:
         """The verdict in words."""
+        is_worse = self.verdict is Verdict.WORSE_THAN_FITTED
+        if is_worse and self.unseen_deg and self.fitted_deg:
+            times = two_digits(self.unseen_deg / self.fitted_deg)
+            return f"predicts {times} times worse than it fits"
         return self.verdict.beside(self.beside)

@@ -1,9 +1,14 @@
 """How sentences, lists and numbers are written."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import count
 from unicodedata import category
+
+NARROW = 0.5
+"""part of a value up to which half of its interval stands behind it, as in "42 ± 3"
+"""
 
 
 def listed(names: Sequence[str], most: int | None = None) -> str:
@@ -46,6 +51,19 @@ def _harmless(letter: str) -> str:
 
 
 _ACTING = ("Cc", "Cf", "Cs")  # controls, marks of direction, and halves of letters
+
+
+def with_minus(text: str) -> str:
+    """Return a text for readers, with a minus sign before each negative number in place
+    of a hyphen.
+
+    A hyphen within a word or an option, or between two numbers, stays.
+    """
+    return _NEGATIVE.sub("−", text)
+
+
+_NEGATIVE = re.compile(r"(?<![^\s(\[])-(?=\.?\d)")
+"""the hyphen of a negative number"""
 
 
 def number(value: float) -> str:
@@ -102,6 +120,20 @@ def value_words(value: float, low: float | None, high: float | None) -> str:
     if of_width > len(rough.partition(".")[2]):
         return f"{value:.{of_width}f}"
     return rough
+
+
+def value_and_interval(value: float, low: float | None, high: float | None) -> str:
+    """Write a value with its interval in short, as "42 ± 3", or with both ends, as
+    "54 (24 to 121)", where these are farther away than NARROW or have no limit."""
+    if low is None or high is None:
+        ends = interval_words(low, high) or "no interval"
+        return f"{two_digits(value)} ({ends})"
+    half = max(high - value, value - low)
+    if half > NARROW * abs(value):
+        return f"{two_digits(value)} ({interval_words(low, high)})"
+    # one digit, and two of a half that begins with 1
+    decimals = max(0, _decimals(half) - (f"{half:e}"[0] != "1"))
+    return f"{value:.{decimals}f} ± {half:.{decimals}f}"
 
 
 def time_words(seconds: float) -> str:

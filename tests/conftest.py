@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 from made_logs import step_log
+from scipy.optimize import least_squares
 
 from hydroid.arm.model import load_model
 from hydroid.hydraulics.records import nominal_joints
@@ -42,6 +43,25 @@ settings.load_profile("hydroid")
 def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures take longest."""
     monkeypatch.setattr("hydroid.reporting.page_file.write_page", lambda *_: [])
+
+
+@pytest.fixture
+def no_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The picture of an arm takes `init` half of its time."""
+    monkeypatch.setattr("hydroid.project.project.arm_picture", lambda *_: b"")
+
+
+@pytest.fixture
+def short_searches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search for valves takes `init` most of the rest.
+
+    It runs as ever but ends at once: for tests of all but the numbers it ends at.
+    """
+
+    def short(*problem: object, max_nfev: int, **how: object):
+        return least_squares(*problem, max_nfev=1, **how)
+
+    monkeypatch.setattr("hydroid.fitting.valve_start.least_squares", short)
 
 
 @pytest.fixture(scope="session")

@@ -86,8 +86,14 @@ class Posterior:
 
     def sd(self, slopes: Array) -> Array:
         """Return the standard deviations of quantities, shape (m,), from derivatives
-        per relative change, (p, m)."""
-        return np.linalg.norm(self.parts(slopes), axis=0)
+        per relative change, (p, m).
+
+        NaN of a quantity with a derivative that is not finite: a change of a parameter
+        leads where it has no value.
+        """
+        finite = np.isfinite(slopes).all(axis=0)
+        deviations = np.linalg.norm(self.parts(np.where(finite, slopes, 0.0)), axis=0)
+        return np.where(finite, deviations, np.nan)
 
     def add(self, rows: Array) -> "Posterior":
         """Return it with information rows' rows, (k, p): derivatives per relative
@@ -136,9 +142,7 @@ class Posterior:
         if inside.any():
             axes = marginal.axes(STEP)
             slopes[inside] = differentiate(function, marginal.box, axes, value)
-        finite = np.isfinite(slopes).all(axis=0)
-        deviations = self.sd(np.where(finite, slopes, 0.0))
-        sd = np.where(finite, deviations, np.nan)
+        sd = self.sd(slopes)
         logarithmic = positive & (value > 0)
         lost = sd > UNIDENTIFIABLE_ABOVE * np.linalg.norm(slopes, axis=0)
         half = self.quantile * sd

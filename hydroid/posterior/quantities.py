@@ -44,6 +44,12 @@ COMMANDS = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 100.0)
 """of the curve of speed in each direction [%]"""
 GAIN_COMMANDS = (-100.0, -75.0, -50.0, -25.0, -10.0, 10.0, 25.0, 50.0, 75.0, 100.0)
 """the same of stage 1, whose directions are alike"""
+LEAST_STEP = 50.0
+"""command of a step response, if it clearly moves the joint [%]"""
+LEAST_OF_GAIN = 40.0
+"""command from which on a gain is taken, likewise [%]"""
+GAIN_OVER = 20.0
+"""how much further it goes [%]"""
 LASTS = 3.0
 """how long the step is held in which dead time and time constant are sought [s]"""
 
@@ -356,9 +362,16 @@ class DirectionTest:
             label = f"{command:g} % command, {self._place}"
             name = f"speed_{command:g}"
             yield Figure(command, name, label, unit, speed[command], what="speed")
-        gain = (speed[60.0] - speed[40.0]) / (60.0 - 40.0)
-        label = f"gain between command and speed from 40 to 60 % command, at {pose}"
-        yield Figure(60.0, "gain", label, f"{unit} per %", gain, of_several=True)
+        # below, part of the commands would lie in the dead band
+        low = first_moving(self.planned, COMMANDS, LEAST_OF_GAIN)
+        high = low + GAIN_OVER
+        if high in speed:
+            gain = (speed[high] - speed[low]) / GAIN_OVER
+            label = (
+                f"gain between command and speed from {low:g} to {high:g} % command, "
+                f"at {pose}"
+            )
+            yield Figure(high, "gain", label, f"{unit} per %", gain, of_several=True)
 
     def _step_figures(self, after: Array, steady: Array) -> Iterator[Figure]:
         """Return what speeds after the step, (n, samples), say beside the steady one,
@@ -389,7 +402,9 @@ def direction_test(
     steady = towards * bench.steady(estimate, commands, bench.loads(estimate))[0]
     planned = dict(zip(COMMANDS, steady, strict=True))
     told = [size for size in COMMANDS if bench.tells(direction.sign * size)]
-    step = bench.movement(direction.sign * largest_told(planned, told), LASTS)
+    step = bench.movement(
+        direction.sign * first_moving(planned, told, LEAST_STEP), LASTS
+    )
     return DirectionTest(
         bench=bench,
         direction=direction,
@@ -401,15 +416,15 @@ def direction_test(
     )
 
 
-def largest_told(planned: Mapping[float, float], told: Sequence[float]) -> float:
-    """Return the command of a step [%]: the smallest from 50 % that clearly moves the
-    joint, or the largest, of those that are told."""
-    for size in told:
-        if size >= 50.0 and planned[size] > ONSET * planned[100.0]:
+def first_moving(
+    planned: Mapping[float, float], commands: Sequence[float], least: float
+) -> float:
+    """Return the smallest of some commands, from `least` on, that clearly moves the joint
+    [%], or the largest; 100 of none."""
+    for size in commands:
+        if size >= least and planned[size] > ONSET * planned[100.0]:
             return size
-    if told:
-        return told[-1]
-    return 100.0
+    return commands[-1] if commands else 100.0
 
 
 def valve_opens(

@@ -17,10 +17,11 @@ from hydroid.posterior.column import Column, Measured
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.quantities import (
     COMMANDS,
+    LEAST_STEP,
     Measure,
     directions,
+    first_moving,
     known_columns,
-    largest_told,
 )
 from hydroid.problem.bindings import Bindings
 from hydroid.settings.fit import FitSettings
@@ -134,7 +135,7 @@ def _moves(bench: Bench, estimate: Candidates) -> list[tuple[Direction, float]]:
         speeds = direction.sign * bench.sense * bench.steady(estimate, commands, loads)
         planned = dict(zip(COMMANDS, speeds[0].tolist(), strict=True))
         told = [size for size in COMMANDS if bench.tells(direction.sign * size)]
-        size = largest_told(planned, told)
+        size = first_moving(planned, told, LEAST_STEP)
         moves.append((direction, direction.sign * size))
     return moves
 

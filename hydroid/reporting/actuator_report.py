@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.estimate import CurveEstimate, FitSummary
+from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
 from hydroid.log import Log
 from hydroid.log.command_sizes import ONE_SIZE, largest_commands, smallest_commands
 from hydroid.posterior.curves import LEAST_START, TIME_CONSTANTS
@@ -18,16 +18,17 @@ from hydroid.reporting.actuator_tables import (
     NEAR,
     RESPONSE_HEADER,
     SETTLED,
-    Settling,
-    bandwidth,
+    TURNED,
+    Crossing,
+    far_commands,
+    phase_crossing,
     response_rows,
-    settling_time,
     speed_table,
 )
 from hydroid.reporting.chart import Chart, Color, Mark, Panel
 from hydroid.reporting.page import Cell, Plot, Section, Table
 from hydroid.reporting.parameters_report import SIDES, direction_word
-from hydroid.reporting.stated_values import value_and_origin, value_of
+from hydroid.reporting.stated_values import in_heading, value_and_origin, value_of
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, two_digits
 
@@ -54,6 +55,15 @@ class Commands(NamedTuple):
     least_positive: float
 
 
+class DeadBand(NamedTuple):
+    """The dead band of a direction [%], whether the fit estimates it, and how a heading
+    states it."""
+
+    value: float
+    estimated: bool
+    words: str
+
+
 Words = Mapping[str, str]
 """what commands of a direction do with a joint, by the direction"""
 TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
@@ -61,15 +71,16 @@ TOWARDS: dict[str, Color] = {"positive": "blue", "negative": "orange"}
 
 _SPEED = (
     "Dead band: up to this command the valve stays shut; at 0 % the smallest command opens it. "
-    "One that is called fixed is not estimated by the fit. "
-    "Lines: the model's steady speed at mid travel, with the sign of the angle, and the opening "
-    "of the valve. Bands: 95 % confidence intervals. Points: measured speeds, in any pose and "
-    "under any load, against the command one dead time earlier. Grey: commands that the logs do "
-    "not contain."
+    "Fixed: not estimated by the fit. Extrapolated: the logs have no command so small. "
+    "Lines: the model's steady speed of the joint alone at mid travel, with the sign of the angle, "
+    "and the opening of the valve. Bands: where these lines lie, to 95 %. Points: speeds in the "
+    "logs against the command one dead time earlier. They may lie outside the bands, as may the "
+    "speeds in Range of validity: the logs have other poses and loads, and joints that share the "
+    "pump. Grey: commands that the logs do not contain."
 )
 _PUMP = (
-    " The joint moves alone. The pump limits its speed, too: it gives at most {pump}. Where the "
-    "load pulls the joint faster than the pump fills its chamber, the valve alone limits it."
+    " The pump limits the speed, too: it gives at most {pump}. Where the load pulls the joint "
+    "faster than the pump fills its chamber, the valve alone limits it."
 )
 _NO_PUMP = " The model's pump has no limit: speeds are those of the valve."
 _SPEED_ALONE = (
@@ -93,7 +104,11 @@ _RESPONSES = (
     "In brackets: 95 % intervals. Settling time: after it, the speed stays within "
     f"{100 * SETTLED:.0f} % of its value {TIME_CONSTANTS:g} time constants after the dead time (or "
     f"{LEAST_START:g} s after the step, if that is later). Over: by then it has not settled. Phase: "
-    "of the speed behind the command."
+    "of the speed against the command; over: it stays above up to this frequency."
+)
+_DELAYS = (
+    " Dead time: from the command until the speed has reached a tenth. The transport delay in "
+    "Parameters is its first part, in which nothing moves. The rest is the lag of valve and arm."
 )
 
 
@@ -107,6 +122,7 @@ def speed_section(
     tabs = list[Plot]()
     fastest = list[str]()
     shut = list[str]()
+    below = list[float]()
     cards = dict[str, Table]()
     for joint in settings.outputs:
         name = settings.arm.name_of(joint)
@@ -124,9 +140,12 @@ def speed_section(
         words = {to: direction_word(summary, name, to) for to in TOWARDS}
         fastest.append(_fastest(name, speed, commands, words))
         if opening is not None:
-            shut.append(f"{name} {_dead_bands(settings, summary, joint)}")
+            bands = _dead_bands(settings, summary, joint)
+            shut.append(f"{name} {_bands_in_words(bands)}")
+            below += _extrapolated(bands, commands)
         table = speed_table(name, speed, opening, cloud)
         note = _beyond(speed, commands) + _pulled(settings, summary, joint, speed)
+        note += _far_from_measured(speed, cloud)
         cards[f"speed_{name}"] = replace(table, note=note)
     if not tabs:
         return None
@@ -135,9 +154,11 @@ def speed_section(
     fastest = [*filter(None, fastest)]
     answer = f"the model's speed at the logs' largest commands: {'; '.join(fastest)}"
     if shut:
-        title = "Valve: dead band, opening, and speed against command"
+        title = "Valve: dead band and speed"
         text = _SPEED + _pump_words(settings, summary)
-        answer = f"dead band: {listed(shut)}; {answer}"
+        answer = f"dead band [%]: {', '.join(shut)}"
+        if below:
+            answer += f"; extrapolated below {_span(below)}"
     text += _TABLE
     return Section(
         title, text, tabs=tuple(tabs), cards=cards, folded=True, answer=answer
@@ -189,30 +210,63 @@ def _of_sign(curve: CurveEstimate, towards: str) -> Array:
     return rows[:, sign * rows[0] > 0]
 
 
-def _dead_bands(settings: FitSettings, summary: FitSummary, joint: int) -> str:
-    """Write the dead bands of a joint for positive and for negative commands."""
-    values, estimated = zip(
-        *(_dead_band(settings, summary, joint, side) for side in SIDES), strict=True
-    )
-    positive, negative = map(two_digits, values)
-    words = f"+{positive} and −{negative} %"
-    if positive == negative:
-        words = f"{positive} %"
-    return words if any(estimated) else f"{words} (fixed)"
+def _dead_bands(
+    settings: FitSettings, summary: FitSummary, joint: int
+) -> tuple[DeadBand, DeadBand]:
+    """Return the dead bands of a joint for positive and for negative commands."""
+    positive, negative = (_dead_band(settings, summary, joint, side) for side in SIDES)
+    return positive, negative
 
 
 def _dead_band(
     settings: FitSettings, summary: FitSummary, joint: int, side: str
-) -> tuple[float, bool]:
-    """Return the dead band of a side of a joint [%], and whether the fit estimates
-    it."""
+) -> DeadBand:
+    """Return the dead band of a side of a joint."""
     # the spool's overlap included
     whole = f"{settings.arm.name_of(joint)}_dead_band_{SIDES[side]}"
-    if whole in summary.quantities:
-        return summary.quantities[whole].value, True
+    if stated := summary.quantities.get(whole):
+        return DeadBand(stated.value, True, in_heading(summary, stated))
     quantity = f"dead_band_{side.lower()}"
     value, estimate = value_of(settings, summary, quantity, joint)
-    return value or 0.0, estimate is not None
+    if estimate is None:
+        return DeadBand(value or 0.0, False, two_digits(value or 0.0))
+    return DeadBand(estimate.value, True, in_heading(summary, estimate))
+
+
+def _bands_in_words(bands: tuple[DeadBand, DeadBand]) -> str:
+    """Write the dead bands of a joint for positive and for negative commands."""
+    positive, negative = bands
+    words = f"+{positive.words} and -{negative.words}"
+    if positive.words == negative.words:
+        words = positive.words
+    is_fixed = not (positive.estimated or negative.estimated)
+    return f"{words} (fixed)" if is_fixed else words
+
+
+def _extrapolated(bands: tuple[DeadBand, DeadBand], commands: Commands) -> list[float]:
+    """Return the smallest commands of the logs in the directions in which the fit places
+    the dead band below them [%]."""
+    sizes = (commands.least_positive, -commands.least_negative)
+    return [
+        size
+        for band, size in zip(bands, sizes, strict=True)
+        if band.estimated and band.value < size
+    ]
+
+
+def _span(sizes: Sequence[float]) -> str:
+    """Write from where to where some sizes go."""
+    low, high = f"{min(sizes):.0f}", f"{max(sizes):.0f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def _far_from_measured(speed: CurveEstimate, measured: Array) -> str:
+    """Say where the measured medians are far from the model's speed; nothing where they
+    are near everywhere."""
+    far = [f"{_signed(command)}" for command in far_commands(speed, measured)]
+    if not far:
+        return ""
+    return f" The measured median is far from the model's speed at {listed(far)} %."
 
 
 def _fastest(name: str, speed: CurveEstimate, commands: Commands, words: Words) -> str:
@@ -228,7 +282,7 @@ def _fastest(name: str, speed: CurveEstimate, commands: Commands, words: Words) 
             word = words[towards] or towards
             # its unit stands once for a joint
             top = two_digits(float(size)) + ("" if said else f" {speed.unit}")
-            said.append(f"{word} {top} at {largest:+.0f} %".replace("-", "−"))
+            said.append(f"{word} {top} at {largest:+.0f} %")
     return f"{name} {', '.join(said)}" if said else ""
 
 
@@ -262,7 +316,7 @@ def _beyond(speed: CurveEstimate, commands: Commands) -> str:
 
 
 def _signed(command: float) -> str:
-    return f"{command:+.0f}".replace("-", "−").replace("+0", "0")
+    return f"{command:+.0f}".replace("+0", "0")
 
 
 def _sides(name: str, summary: FitSummary) -> dict[str, str]:
@@ -276,10 +330,12 @@ def _sides(name: str, summary: FitSummary) -> dict[str, str]:
     return sides
 
 
-def _measured_cloud(logs: Sequence[Log], joint: int, dead_times: list[float]) -> Array:
+def _measured_cloud(
+    logs: Sequence[Log], joint: int, dead_times: Sequence[QuantityEstimate]
+) -> Array:
     """Return commands [%] and measured speeds [rad/s] of a joint in all logs, shape
     (2, n)."""
-    delay = float(np.mean(dead_times)) if dead_times else 0.0
+    delay = float(np.mean([time.value for time in dead_times])) if dead_times else 0.0
     pairs = [np.empty((2, 0))]
     for log in logs:
         if log.measures(joint):
@@ -313,7 +369,10 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     rings = value_of(settings, summary, "oil_frequency")[0] is not None
     if settings.rung.has("oil_frequency") and not rings:
         text += _NO_SPRING
-    tables = {"responses": Table("", RESPONSE_HEADER, tuple(rows), _RESPONSES)}
+    note = _RESPONSES
+    if any(_has_delay(settings, summary, joint) for joint in settings.outputs):
+        note += _DELAYS
+    tables = {"responses": Table("", RESPONSE_HEADER, tuple(rows), note)}
     return Section(
         title,
         text,
@@ -324,44 +383,36 @@ def step_section(settings: FitSettings, summary: FitSummary) -> Section | None:
     )
 
 
+def _has_delay(settings: FitSettings, summary: FitSummary, joint: int) -> bool:
+    """Return whether a joint's commands have a transport delay."""
+    sides = ("delay_a", "delay_b")
+    return any(value_of(settings, summary, side, joint)[0] for side in sides)
+
+
 def _steps(name: str, summary: FitSummary) -> list[str]:
     """Return the directions in which a fit states the step response of a joint."""
     return [one for one in TOWARDS if f"{name}_step_{one}" in summary.curves]
 
 
 def _slower(names: Sequence[str], summary: FitSummary) -> str:
-    """Say how late and how slow joints are, each in its slower direction; nothing where
-    the fit does not state it."""
+    """Say how late joints are in their slower directions, and at which frequency the first
+    of them lags by a quarter; nothing where the fit does not state it."""
     late = list[str]()
-    narrow = list[str]()
-    settled = list[str]()
+    turned = dict[str, Crossing]()
     for name in names:
         if dead_times := _dead_times(name, summary):
-            late.append(f"{name} {two_digits(max(dead_times))} s")
-        if widths := _bandwidths(name, summary.curves):
-            narrow.append(f"{name} {two_digits(min(widths))} Hz")
-        if times := _settling_times(name, summary):
-            settled.append(f"{name} {max(times)} s")
-    answers = {
-        "dead time": late,
-        "bandwidth (-3 dB)": narrow,
-        f"settling time ({100 * SETTLED:.0f} %)": settled,
-    }
-    said = [f"{what}: {listed(of)}" for what, of in answers.items() if of]
-    return f"in the slower direction: {'; '.join(said)}" if said else ""
-
-
-def _bandwidths(name: str, curves: Mapping[str, CurveEstimate]) -> list[float]:
-    """Return the bandwidths of a joint in both directions [Hz], as far as they lie
-    within the curves."""
-    both = map(bandwidth, _towards(name, "amplitude", curves).values())
-    return [width for width in both if width is not None]
-
-
-def _settling_times(name: str, summary: FitSummary) -> list[Settling]:
-    """Return when the steps of a joint in both directions settle."""
-    times = (settling_time(name, towards, summary) for towards in TOWARDS)
-    return [time for time in times if time is not None]
+            latest = max(dead_times, key=lambda time: time.value)
+            late.append(f"{name} {in_heading(summary, latest)}")
+        phases = _towards(name, "phase", summary.curves).values()
+        if crossings := [*filter(None, map(phase_crossing, phases))]:
+            turned[name] = min(crossings)
+    answers = list[str]()
+    if late:
+        answers.append(f"dead time [s]: {', '.join(late)}")
+    if turned:
+        first = min(turned, key=turned.__getitem__)
+        answers.append(f"phase {TURNED:g}° at {turned[first].short} Hz ({first})")
+    return "; ".join(answers)
 
 
 def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:
@@ -398,15 +449,11 @@ def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:
     return np.array(commands), np.array(speeds)
 
 
-def _dead_times(name: str, summary: FitSummary) -> list[float]:
+def _dead_times(name: str, summary: FitSummary) -> list[QuantityEstimate]:
     """Return the dead times of a joint in both directions [s], as far as the fit states
     them."""
-    times = list[float]()
-    for towards in TOWARDS:
-        dead_time = summary.quantities.get(f"{name}_dead_time_{towards}")
-        if dead_time is not None:
-            times.append(dead_time.value)
-    return times
+    both = (summary.quantities.get(f"{name}_dead_time_{to}") for to in TOWARDS)
+    return [time for time in both if time is not None]
 
 
 def _speed_chart(

@@ -1,16 +1,25 @@
 """What the curves of the actuators say at the places that an engineer asks for, as
 tables: every tenth per cent of command, 1 Hz."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.estimate import CurveEstimate, FitSummary, QuantityEstimate
+from hydroid.estimate import (
+    CurveEstimate,
+    FitSummary,
+    Interval,
+    QuantityEstimate,
+)
 from hydroid.posterior.curves import LEAST_START, TIME_CONSTANTS
 from hydroid.reporting.page import Cell, Table
-from hydroid.words import interval_words, three_digits, two_digits, value_words
+from hydroid.words import (
+    interval_words,
+    three_digits,
+    two_digits,
+    value_words,
+)
 
 EVERY = 10.0
 """commands of the table of speeds [%]"""
@@ -25,8 +34,12 @@ SETTLED = 0.05
 NOT_YET = 0.9
 """part of the time that a step has to settle, after which it cannot be told whether it
 has"""
-PHASE_AT = 1.0
-"""frequency at which the phase is stated [Hz]"""
+TURNED = -90.0
+"""phase whose frequency is stated [deg]"""
+FAR = 0.25
+"""part of a speed by which a measured one is far from it"""
+LEAST_FAR = 0.05
+"""part of the top speed below which no measured speed is called far"""
 
 
 def speed_table(
@@ -61,13 +74,38 @@ def speed_table(
 
 
 def _median(command: float, measured: Array, least: float) -> str | None:
-    """Return the median speed near a command, 0 below the least one; nothing of too
+    """Write the median speed near a command, 0 below the least one; nothing of too
     few."""
-    speeds = measured[1, np.abs(measured[0] - command) <= NEAR]
-    if len(speeds) < LEAST_MEASURED:
+    median = _median_speed(command, measured)
+    if median is None:
         return None
-    median = float(np.median(speeds))
     return three_digits(median) if abs(median) >= least else "0"
+
+
+def _median_speed(command: float, measured: Array) -> float | None:
+    """Return the median of the measured speeds near a command; None of too few."""
+    speeds = measured[1, np.abs(measured[0] - command) <= NEAR]
+    return float(np.median(speeds)) if len(speeds) >= LEAST_MEASURED else None
+
+
+def far_commands(speed: CurveEstimate, measured: Array) -> list[float]:
+    """Return the commands of the table of speeds [%] at which the measured median lies
+    outside the model's interval, and is far from its speed.
+
+    Speeds too small to matter do not count.
+    """
+    matters = LEAST_FAR * max(map(abs, speed.value))
+    far = list[float]()
+    points = zip(speed.at, speed.value, speed.interval, strict=True)
+    for command, value, (low, high) in points:
+        median = _median_speed(command, measured)
+        if command % EVERY or median is None or low is None or high is None:
+            continue
+        size = max(abs(median), abs(value))
+        is_far = abs(median - value) > FAR * size and size > matters
+        if is_far and not low <= median <= high:
+            far.append(command)
+    return far
 
 
 RESPONSE_HEADER = (
@@ -77,7 +115,7 @@ RESPONSE_HEADER = (
     "time constant [s]",
     f"settling time ({100 * SETTLED:.0f} %) [s]",
     "bandwidth (-3 dB) [Hz]",
-    f"phase at {PHASE_AT:g} Hz [deg]",
+    f"phase {TURNED:g}° at [Hz]",
 )
 
 
@@ -90,6 +128,7 @@ def response_rows(name: str, towards: str, summary: FitSummary) -> tuple[Cell, .
     # the command and the direction
     label = step.label.partition(" to ")[2] if step else towards
     width = bandwidth(amplitude) if amplitude else None
+    turned = phase_crossing(phase) if phase else None
     settling = settling_time(name, towards, summary)
     return (
         name,
@@ -98,7 +137,7 @@ def response_rows(name: str, towards: str, summary: FitSummary) -> tuple[Cell, .
         _quantity(summary.quantities.get(f"{name}_time_constant_{towards}")),
         None if settling is None else str(settling),
         None if width is None else two_digits(width),
-        None if phase is None else _at(phase, PHASE_AT),
+        None if turned is None else turned.cell,
     )
 
 
@@ -154,12 +193,59 @@ def bandwidth(amplitude: CurveEstimate) -> float | None:
     return float(np.exp(np.interp(0.0, -gain[ends], at)))
 
 
-def _at(curve: CurveEstimate, place: float) -> str | None:
-    """Return a curve's value between its points; nothing beyond them."""
-    places: Sequence[float] = curve.at
-    if not places[0] <= place <= places[-1]:
+class Crossing(NamedTuple):
+    """The frequency at which a phase is TURNED [Hz], with its 95 % interval; or, if it is
+    `open`, up to which it stays above."""
+
+    frequency: float
+    interval: Interval = (None, None)
+    open: bool = False
+
+    @property
+    def cell(self) -> str:
+        """Write it for a table, as "0.46 (0.41 to 0.52)", or "over 4.6"."""
+        if self.open:
+            return self.short
+        between = interval_words(*self.interval)
+        value = value_words(self.frequency, *self.interval)
+        return f"{value} ({between})" if between else value
+
+    @property
+    def short(self) -> str:
+        """Write it for a heading, without its interval."""
+        return f"{'over ' if self.open else ''}{two_digits(self.frequency)}"
+
+
+def phase_crossing(phase: CurveEstimate) -> Crossing | None:
+    """Return where a phase, which falls with the frequency, is TURNED; None where it is
+    further turned at the lowest frequency.
+
+    Only the frequencies count at which the logs determine the phase, if they do at any.
+    """
+    ends = np.array(phase.interval, dtype=float)
+    known = np.isfinite(ends).all(axis=1)
+    count = len(ends)
+    if known.any() and not known.all():
+        count = max(int(np.argmin(known)), 1)
+    at = np.log(phase.at[:count])
+    value = np.array(phase.value[:count])
+    if value[0] <= TURNED:
         return None
-    return f"{float(np.interp(np.log(place), np.log(places), curve.value)):.0f}"
+    frequency = _falls_to_turned(at, value)
+    if frequency is None:
+        return Crossing(phase.at[count - 1], open=True)
+    low, high = (_falls_to_turned(at, end) for end in ends[:count].T)
+    return Crossing(frequency, (low, high))
+
+
+def _falls_to_turned(at: Array, phase: Array) -> float | None:
+    """Return the frequency [Hz] at which a phase over logarithms of frequencies, (n,),
+    first falls to TURNED; None where it does so at none of them, or before."""
+    below = np.flatnonzero(phase <= TURNED)
+    if not len(below) or below[0] == 0:
+        return None
+    ends = slice(below[0] - 1, below[0] + 1)
+    return float(np.exp(np.interp(-TURNED, -phase[ends], at[ends])))
 
 
 def _quantity(quantity: QuantityEstimate | None) -> str | None:

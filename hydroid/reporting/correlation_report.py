@@ -70,13 +70,13 @@ def correlation_section(settings: FitSettings, summary: FitSummary) -> Section |
     matrix = correlations(covariance)[np.ix_(order, order)]
     pairs = strongest(matrix, names)
     points = tuple(
-        f"{named(settings, first)} and {named(settings, second)}: {_signed(value)}"
+        f"{named(settings, first)} and {named(settings, second)}: {value:+.2f}"
         for first, second, value in pairs
     )
     answer = "no pair is strongly correlated"
     if points:
         first, second, value = pairs[0]
-        answer = f"strongest: {first} and {second}, {_signed(value)}"
+        answer = f"strongest: {first} and {second}, {value:+.2f}"
     title = "Which parameters are correlated?"
     tabs = tuple(_maps(settings, matrix, names))
     return Section(title, _TEXT, points, tabs=tabs, folded=True, answer=answer)
@@ -123,7 +123,3 @@ def correlation_map(matrix: Array, names: tuple[str, ...]) -> Chart:
     below = 30 + LETTER * max(map(len, names))
     height = below + min(ROW * len(names), LARGEST)
     return Chart((Panel("", "", (cells,), height=height, rows=names, columns=names),))
-
-
-def _signed(value: float) -> str:
-    return f"{value:+.2f}".replace("-", "−")

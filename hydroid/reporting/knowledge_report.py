@@ -14,6 +14,7 @@ from hydroid.joint_verdict import JointVerdict
 from hydroid.posterior.uncertainty import source_of
 from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.parameters_report import held_masses, sentence, shares_in_words
+from hydroid.reporting.stated_values import is_mostly_prior
 from hydroid.settings.fit import FitSettings
 from hydroid.units import Display
 from hydroid.words import interval_words, listed, significant, two_digits, value_words
@@ -53,8 +54,6 @@ _MEASURED_ERRORS = (
     "than expected where parameters or the model err, or where something differs in these logs. "
     "The bands allow for inexact parameters."
 )
-MOSTLY = 0.5
-"""share of the information below which the logs gave the lesser part of it"""
 ELSEWHERE = ("combination", "error lasts")
 """findings that another section of the page shows better"""
 
@@ -208,7 +207,7 @@ def _within(quantity: QuantityEstimate) -> str:
     """Write an interval, and how much of it is the prior's where most is: it is then no
     news from the logs."""
     share = quantity.data_share
-    if share is None or share >= MOSTLY:
+    if share is None or not is_mostly_prior(quantity):
         return _ends(quantity)
     return f"{_ends(quantity)} ({100 * (1 - share):.0f} % prior)"
 

@@ -1,6 +1,7 @@
 """What each joint carries, what a load does to its speed, and whether its valve leaks."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from hydroid.estimate import FitSummary
 from hydroid.identified_model import IdentifiedModel
@@ -9,9 +10,18 @@ from hydroid.posterior.posterior import stored_posterior
 from hydroid.posterior.under_load import Known, MovedUnderLoad, UnderLoad, under_load
 from hydroid.reporting.knowledge_report import quantity_source
 from hydroid.reporting.page import Cell, Section, Table
-from hydroid.reporting.stated_values import value_and_origin
+from hydroid.reporting.stated_values import is_mostly_prior, value_and_origin
 from hydroid.settings.fit import FitSettings
-from hydroid.words import interval_words, three_digits, value_words
+from hydroid.words import (
+    interval_words,
+    listed,
+    three_digits,
+    value_and_interval,
+    value_words,
+)
+
+LEAST_CHANGE = 1.0
+"""change of a speed under load that a heading names [%]"""
 
 _CARRIED = (
     "Each joint in the middle of its logged travel; the other joints stand where the first log "
@@ -63,15 +73,46 @@ def load_section(model: IdentifiedModel, logs: Sequence[Log]) -> Section | None:
     text = _CARRIED
     header = _CARRIED_HEADER
     if has_valves:
-        title = "Load: gravity, inertia, load dependence of the speed, leakage"
+        title = "Load, inertia, friction, leakage"
         header += _LEAKAGE_HEADER
         text += _LOADED if loaded else ""
-        text += _LEAKS
+        text += _LEAKS + _without_friction(settings, summary)
     tables = {"carried": Table("", header, tuple(carried))}
     if loaded:
         tables["loaded"] = Table("", _LOADED_HEADER, tuple(loaded))
     answer = _answer(settings, summary, joints)
     return Section(title, text, tables=tables, folded=True, answer=answer)
+
+
+def _without_friction(settings: FitSettings, summary: FitSummary) -> str:
+    """Say which joints of a model with valves have no friction, and what makes up for it;
+    nothing where all have some."""
+    smooth: dict[bool, list[str]] = {True: [], False: []}
+    for joint in settings.outputs:
+        has = partial(_acts, settings, summary, joint)
+        if not (has("dry_friction") or has("friction")):
+            smooth[has("damping")].append(settings.arm.name_of(joint))
+    said = ""
+    for is_damped, names in smooth.items():
+        if names:
+            where = "the damping of the joint and " if is_damped else ""
+            said += (
+                f" The model of {listed(names)} has no friction: such losses are in "
+                f"{where}the fitted opening of the valve."
+            )
+    return said
+
+
+def _acts(
+    settings: FitSettings, summary: FitSummary, joint: int, quantity: str
+) -> bool:
+    """Return whether a quantity of a joint has a value other than 0."""
+    for name, parameter in settings.parameters.items():
+        is_here = joint in (parameter.joints or (joint,))
+        if is_here and parameter.quantity == quantity:
+            return bool(summary.estimate[name].value)
+    # dampers and friction of joints are parameters or none
+    return bool(getattr(settings.hydraulics, quantity, 0.0))
 
 
 def leakage(settings: FitSettings, summary: FitSummary, joint: int) -> str:
@@ -84,33 +125,43 @@ def leakage(settings: FitSettings, summary: FitSummary, joint: int) -> str:
 def _answer(
     settings: FitSettings, summary: FitSummary, joints: Sequence[UnderLoad]
 ) -> str:
-    """Say what twice the load does to the speeds, and of the leakage whether it is
-    known."""
+    """Say what load the logs state, whether masses are known from them, and what twice
+    the load does to the speeds."""
     slower = list[str]()
-    leaks = dict[str, list[str]]()
     for one in joints:
-        name = settings.arm.name_of(one.joint)
-        changes = [
-            f"{moved.word} {_percent(moved.change)}"
-            for moved in one.moved
-            if moved.change is not None
-        ]
-        if changes:
-            slower.append(f"{name} {', '.join(changes)}")
-        if settings.stage == "hyd":
-            leaks.setdefault(leakage(settings, summary, one.joint), []).append(name)
-    answers = list[str]()
+        changes = [moved.change for moved in one.moved if moved.change is not None]
+        most = max(changes, key=lambda change: abs(change.value), default=None)
+        if most and abs(most.value) >= LEAST_CHANGE:
+            slower.append(f"{settings.arm.name_of(one.joint)} {_percent(most)}")
+    answers = [_payload(settings), *_prior_masses(settings, summary)]
     if slower:
-        answers.append(f"speeds if the load of gravity doubles: {'; '.join(slower)}")
-    for words, names in leaks.items():
-        of = f" of {', '.join(names)}" if len(leaks) > 1 else ""
-        answers.append(f"leakage{of}: {words}")
+        answers.append(f"speed at twice the load: {', '.join(slower)}")
     return "; ".join(answers)
 
 
+def _payload(settings: FitSettings) -> str:
+    """Say which payloads the settings state of logs [kg]."""
+    stated = [f"{kg:g}" for kg in dict.fromkeys(settings.payloads.values())]
+    return f"payload: {listed(stated)} kg" if stated else "no payload stated"
+
+
+def _prior_masses(settings: FitSettings, summary: FitSummary) -> list[str]:
+    """Say which of the masses that a fit estimates are mostly the priors'."""
+    free = [
+        name
+        for name, parameter in settings.parameters.items()
+        if parameter.quantity == "mass" and parameter.fixed is None
+    ]
+    vague = [name for name in free if is_mostly_prior(summary.estimate[name])]
+    if not vague:
+        return []
+    of = "" if len(vague) == len(free) else f" ({listed(vague)})"
+    return [f"masses{of} mostly prior"]
+
+
 def _percent(change: Known) -> str:
-    percent = round(change.value)
-    return f"{percent:+d} %".replace("-", "−") if percent else "0 %"
+    sign = "+" if change.value > 0 else ""
+    return f"{sign}{value_and_interval(change.value, *change.interval)} %"
 
 
 def _carried_row(

@@ -13,7 +13,7 @@ from hydroid.prediction import OilTrace
 from hydroid.reporting.page import Cell, Section, Table, log_names
 from hydroid.reporting.response_report import BAR, LITRES_PER_MINUTE
 from hydroid.reporting.shared_pump import SlowDown
-from hydroid.reporting.stated_values import value_and_origin, value_of
+from hydroid.reporting.stated_values import in_heading, value_and_origin, value_of
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.words import listed, three_digits, two_digits
@@ -76,9 +76,7 @@ def oil_section(
         pump_words = _PUMP
         most = value_and_origin(settings, summary, "pump_flow")
         tables["pump"] = Table("", _PUMP_HEADER, (pump,))
-        _, high, low, *_ = pump
-        flow = two_digits(value_of(settings, summary, "pump_flow")[0] or 0.0)
-        answer = f"the pump gives at most {flow} L/min, and its line falls from {high} to {low} bar"
+        answer = f"pump at most {_pump_flow(settings, summary)}"
     if slower:
         tables["slower"] = slower.table
         answer += f"; {slower.answer}"
@@ -93,6 +91,14 @@ def oil_section(
     if slower is None:
         title = "Pressures and flows"
     return Section(title, text, tables=tables, folded=True, answer=answer)
+
+
+def _pump_flow(settings: FitSettings, summary: FitSummary) -> str:
+    """Write the largest flow of the pump for a heading."""
+    value, estimate = value_of(settings, summary, "pump_flow")
+    if estimate is None:
+        return f"{two_digits(value or 0.0)} L/min (fixed)"
+    return in_heading(summary, estimate, "L/min")
 
 
 def _measured_words(predictions: Sequence[Prediction]) -> str:

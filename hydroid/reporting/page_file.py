@@ -24,7 +24,7 @@ from hydroid.arrays import Array
 from hydroid.files import fill_template, write_atomic
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.page import Page, Table, short_name
-from hydroid.words import distinct
+from hydroid.words import distinct, with_minus
 
 _QUOTED = re.compile("“([^”]+)”")
 
@@ -88,7 +88,12 @@ def plain(drawn: Any) -> Any:
         case np.ndarray():
             return list(drawn)
         case _:
-            return vars(drawn)
+            return {name: _labelled(value) for name, value in vars(drawn).items()}
+
+
+def _labelled(value: Any) -> Any:
+    """Return a title or label as a reader is shown it, and what is none unchanged."""
+    return with_minus(value) if isinstance(value, str) else value
 
 
 def _five_digits(values: Array) -> list[float | None]:
@@ -115,6 +120,7 @@ def html(page: Page) -> str:
     return fill_template(
         "reporting/template.html.j2",
         page=page,
+        minus=with_minus,
         charts=charts,
         content=_packed(text),
         linked=partial(_linked, titles),

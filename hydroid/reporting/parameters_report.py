@@ -39,6 +39,7 @@ Intervals = Mapping[str, tuple[float, float]]
 
 _NOTE = "from, to: 95 % interval; empty: no limit. data: share of the information from the logs."
 _BY_LOG = " by log: 95 %, estimated from how the logs differ."
+_USE_BY_LOG = " Use it where it is given: the logs disagree."
 _PRIORS = (
     "Grey: what was expected before the fit (95 %). Blue: what is known after it (95 %); "
     "points: the estimates. Where blue is as wide as grey, the logs added nothing."
@@ -134,10 +135,8 @@ def prior_section(settings: FitSettings, summary: FitSummary) -> Section | None:
 def short_table(settings: FitSettings, summary: FitSummary) -> Table:
     """Return one line per parameter for a reader: `parameter_table` has bounds and more
     digits."""
-    columns = [*WHAT_IT_IS, "interval"]
-    if summary.left_out_deg:
-        columns.append("by log")
-    columns.append("source")
+    intervals = _in_order(summary, ("interval",), ("by log",))
+    columns = [*WHAT_IT_IS, *intervals, "source"]
     rows = list[Row]()
     for name in by_joint(settings, [*summary.estimate]):
         estimate = summary.estimate[name]
@@ -158,7 +157,25 @@ def short_table(settings: FitSettings, summary: FitSummary) -> Table:
     note = "side A: positive commands, side B: negative ones. interval: 95 % confidence interval."
     if summary.left_out_deg:
         note += _BY_LOG
+    if logs_disagree(summary):
+        note += _USE_BY_LOG
     return Table.of("Parameters", {name: name for name in columns}, rows, note)
+
+
+def logs_disagree(summary: FitSummary) -> bool:
+    """Return whether the fit warns that intervals are too narrow, because its logs
+    disagree, and that those by log are to be used."""
+    return any(finding.kind == "logs disagree" for finding in summary.findings)
+
+
+def _in_order(
+    summary: FitSummary, plain: tuple[str, ...], by_log: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Return the columns of both kinds of intervals, in front those that are to be used;
+    those by log only where there are any."""
+    if not summary.left_out_deg:
+        return plain
+    return by_log + plain if logs_disagree(summary) else plain + by_log
 
 
 def shares_in_words(source: str, share: float) -> str:
@@ -190,7 +207,7 @@ def parameter_table(
     """
 
     by_log = ("by log from", "by log to") if summary.left_out_deg else ()
-    columns = [*WHAT_IT_IS, "from", "to", *by_log]
+    columns = [*WHAT_IT_IS, *_in_order(summary, ("from", "to"), by_log)]
     if profiles:
         columns += ["profile from", "profile to"]
     columns += ["lower", "upper", "data [%]", "source"]
@@ -208,7 +225,8 @@ def parameter_table(
             row["data [%]"] = 100 * estimate.data_share
         row["source"] = origin(estimate)
         rows.append(row)
-    optional = ("quantity", "side", "joint", *by_log, "data [%]", "lower", "upper")
+    less_used = ("from", "to") if logs_disagree(summary) else by_log
+    optional = ("quantity", "side", "joint", *less_used, "data [%]", "lower", "upper")
     shown = {name: name for name in columns}
     note = _NOTE + _BY_LOG if by_log else _NOTE
     return Table.of("Parameters", shown, rows, note, optional)

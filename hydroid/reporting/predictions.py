@@ -41,7 +41,7 @@ from hydroid.reporting.response_report import error_table, response_section
 from hydroid.reporting.search_report import search_section
 from hydroid.reporting.shared_pump import slow_down
 from hydroid.reporting.use_report import use_section
-from hydroid.reporting.validity_report import validity_section
+from hydroid.reporting.validity_report import log_next, validity_section
 from hydroid.reporting.verdict_table import (
     Verdicts,
     horizon_section,
@@ -151,7 +151,7 @@ def _fit_sections(
     logs = [prediction.log for prediction in fitted]
     step = next_step(summary, run.verdict, run.folder, fitted)
     sections = (
-        *verdict_sections(fits, shown, step),
+        *verdict_sections(fits, shown, step, points=log_next(run)),
         *prediction_sections(shown, settings.arm, fits),
         quantity_section(settings, summary),
         error_section(settings, summary, run.verdict),

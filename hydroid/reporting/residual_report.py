@@ -2,7 +2,7 @@
 of any model.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -17,7 +17,7 @@ from hydroid.problem.problem import Problem
 from hydroid.reporting.chart import Chart, Mark, Panel, zero_line
 from hydroid.reporting.page import Cell, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
-from hydroid.words import listed, two_digits
+from hydroid.words import two_digits
 
 _TEXT = (
     "The 95 % confidence intervals hold only if the model is right. This test can show that it is "
@@ -50,8 +50,8 @@ def residual_section(
     tests = _tests(settings, summary, usable)
     tabs = list[Plot]()
     rows = list[tuple[Cell, ...]]()
-    by_itself = list[str]()
-    by_command = list[str]()
+    by_itself = dict[str, float]()
+    by_command = dict[str, float]()
     for joint, test in tests.items():
         name = settings.arm.name_of(joint)
         draw = partial(_correlations, name, test)
@@ -61,30 +61,45 @@ def residual_section(
         with_command = float(np.abs(test.with_command).max())
         shares = [100 * part for part in test.outside]
         rows.append((name, *map(two_digits, (in_time, with_command, *shares))))
-        if in_time > FAINT:
-            by_itself.append(f"{name} {two_digits(in_time)}")
-        if with_command > FAINT:
-            by_command.append(f"{name} {two_digits(with_command)}")
+        by_itself[name] = in_time
+        by_command[name] = with_command
     return Section(
         "Confidence intervals: are the residuals white?",
         _TEXT,
         tables={"residuals": Table("", _HEADER, tuple(rows))},
         tabs=tuple(tabs),
         folded=True,
-        answer=_answer(by_itself, by_command),
+        answer=_answer(by_itself, by_command, _lasting(settings, summary)),
     )
 
 
-def _answer(by_itself: Sequence[str], by_command: Sequence[str]) -> str:
-    """Say which joints have a correlation above FAINT."""
-    answers = list[str]()
-    if by_itself:
-        answers.append(f"largest autocorrelation: {listed(by_itself)}")
-    if by_command:
-        answers.append(f"with the command: {listed(by_command)}")
-    if answers:
-        return f"no, on the fitted logs, so intervals may be too narrow; {'; '.join(answers)}"
+def _answer(
+    by_itself: Mapping[str, float], by_command: Mapping[str, float], lasting: str
+) -> str:
+    """Say whether all correlations are below FAINT, and if not, how long the error lasts,
+    or how large the largest ones are."""
+    said = list[str]()
+    for what, sizes in (
+        ("autocorrelation", by_itself),
+        ("with the command", by_command),
+    ):
+        joint = max(sizes, key=sizes.__getitem__)
+        if sizes[joint] > FAINT:
+            said.append(f"{what} up to {two_digits(sizes[joint])} ({joint})")
+    if said:
+        return f"no, so intervals may be too narrow; {lasting or ', '.join(said)}"
     return f"yes, on the fitted logs: no correlation is above {FAINT:g}"
+
+
+def _lasting(settings: FitSettings, summary: FitSummary) -> str:
+    """Say of the joint whose error lasts longest how long what is left of it does; nothing
+    where none lasts longer than the error model says."""
+    times = {joint: summary.errors[f"q{joint}"].lasts_s for joint in settings.outputs}
+    joint = max(times, key=times.__getitem__)
+    if not times[joint]:
+        return ""
+    name = settings.arm.name_of(joint)
+    return f"what is left of the {name}'s error lasts {two_digits(times[joint])} s"
 
 
 def _tests(

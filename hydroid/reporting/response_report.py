@@ -52,8 +52,8 @@ ALL = "joints"
 """column of the responses of all joints together"""
 
 _MATRIX = (
-    "Rms error of each joint in each log. Green: good; amber: up to twice what is good; red: "
-    "worse. Choose one to see its response and the arm in motion."
+    "Rms error of each joint in each log. Green: within the allowed error; amber: up to twice it; "
+    "red: worse. Choose one to see its response and the arm in motion."
 )
 _MOTION = (
     "Orange: simulated. Grey: measured, hidden where both agree. The picture begins where "

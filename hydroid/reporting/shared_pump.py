@@ -13,7 +13,7 @@ from hydroid.plant.plant import Plant
 from hydroid.plant.steady import SteadyArm
 from hydroid.reporting.page import Cell, Table
 from hydroid.reporting.parameters_report import direction_word
-from hydroid.words import listed, three_digits
+from hydroid.words import three_digits
 
 LEAST_PART = 1e-3
 """of the largest command's speed, below which a joint stands still"""
@@ -34,7 +34,7 @@ class Drive(NamedTuple):
 
 
 class SlowDown(NamedTuple):
-    """The table of what joints lose beside another one, and the most that each
+    """The table of what joints lose beside another one, and the most that one of them
     loses, in words."""
 
     table: Table
@@ -58,29 +58,26 @@ def slow_down(model: IdentifiedModel, logs: Sequence[Log]) -> SlowDown | None:
     names = [settings.arm.name_of(joint) for joint in outputs]
     header = ("joint", "command", "unit", "alone", *(f"beside {one}" for one in names))
     rows = list[tuple[Cell, ...]]()
-    most = dict[int, tuple[float, str]]()
+    most = dict[int, float]()
     for drive, (alone, beside) in zip(drives, changes, strict=True):
         if np.isnan(beside).all():
             continue
         shown = settings.arm.joint(drive.joint).shown
         name = settings.arm.name_of(drive.joint)
-        command = f"{drive.command:+.0f} % {drive.word}".replace("-", "−").strip()
+        command = f"{drive.command:+.0f} % {drive.word}".strip()
         of_others = beside[[joint - 1 for joint in outputs]]
         speed = three_digits(abs(shown.factor * alone))
         cells = [_percent(change) for change in of_others]
         rows.append((name, command, f"{shown.unit}/s", speed, *cells))
-        worst = int(np.nanargmin(of_others))
-        lost = (float(of_others[worst]), names[worst])
+        lost = float(np.nanmin(of_others))
         most[drive.joint] = min(lost, most.get(drive.joint, lost))
     if not rows:
         return None
-    said = [
-        f"{settings.arm.name_of(joint)} {_percent(change)} ({other})"
-        for joint, (change, other) in most.items()
-    ]
+    slowest = min(most, key=most.__getitem__)
+    slowed = f"{settings.arm.name_of(slowest)} {_percent(most[slowest])}"
     return SlowDown(
         Table("", header, tuple(rows), _NOTE),
-        f"speed beside another joint: {listed(said)}",
+        f"{slowed} beside another joint",
     )
 
 
@@ -140,4 +137,4 @@ def _percent(change: float) -> str:
     """Write a change [%]; nothing of NaN."""
     if np.isnan(change):
         return ""
-    return f"{change:+.0f} %".replace("-", "−") if abs(change) >= 0.5 else "0 %"
+    return f"{change:+.0f} %" if abs(change) >= 0.5 else "0 %"

@@ -36,7 +36,7 @@ MOST_TRAVEL = 0.7
 """part of a joint's range that logs should cover"""
 TOGETHER = 0.1
 """part of the driven time in which several joints should move"""
-SIGNS = {1.0: "+", -1.0: "−"}
+SIGNS = {1.0: "+", -1.0: "-"}
 HEADER = (
     "joint",
     "unit",
@@ -141,31 +141,36 @@ def _speeds(log: Log, joint: int) -> Array:
 
 
 def validity_section(run: FinishedRun) -> Section:
-    """Return the folded section of what a fit's logs cover, and what to log next."""
+    """Return the folded section of what a fit's logs cover."""
     settings = run.settings
-    logs = [prediction.log for prediction in run.result.fitted]
-    joints = [covered(settings, logs, joint) for joint in settings.outputs]
-    lacks = [*_lacks_of_joints(joints), *_lacks_of_logs(run, logs)]
-    valid = [
-        f"{one.joint} {_valid_commands(one)} %, {_positions(one)}" for one in joints
-    ]
-    answer = f"valid for free motion, {listed(valid)}"
-    if lacks:
-        answer += f"; log next: {listed([one.what for one in lacks])}"
-    points = [*_limits(settings)]
-    points += [f"Log next: {one.what}{one.where}. {one.why}" for one in lacks]
-    points.append(
-        "Which parameter an experiment would narrow, and whether to weigh or to measure instead: "
-        f"hydroid suggest --fit {shlex.quote(run.folder)}. The experiment itself: hydroid design."
-    )
+    joints = _all_covered(run)
+    reached = [f"{one.joint} {_commands(one, 'and')}" for one in joints]
     return Section(
-        "Range of validity, and what to log next",
+        "Range of validity",
         _TEXT.format(period=settings.log.period_s),
-        points=tuple(points),
+        points=tuple(_limits(settings)),
         tables={"covered": Table("", HEADER, tuple(map(_row, joints)))},
         folded=True,
-        answer=answer,
+        answer=f"free motion, commands [%] up to: {', '.join(reached)}{_none_below(joints)}",
     )
+
+
+def log_next(run: FinishedRun) -> tuple[str, ...]:
+    """Return what the next logs of a machine should have, as the fitted ones lack it."""
+    logs = [prediction.log for prediction in run.result.fitted]
+    lacks = [*_lacks_of_joints(_all_covered(run)), *_lacks_of_logs(run, logs)]
+    points = [f"Log {one.what}{one.where}. {one.why}" for one in lacks]
+    points.append(
+        f"hydroid suggest --fit {shlex.quote(run.folder)} says what an experiment, or weighing, would "
+        "narrow. hydroid design plans the experiment."
+    )
+    return tuple(points)
+
+
+def _all_covered(run: FinishedRun) -> list[Covered]:
+    """Return what the fitted logs of a run cover of each compared joint."""
+    logs = [prediction.log for prediction in run.result.fitted]
+    return [covered(run.settings, logs, joint) for joint in run.settings.outputs]
 
 
 def _limits(settings: FitSettings) -> Iterator[str]:
@@ -190,10 +195,8 @@ def _limits(settings: FitSettings) -> Iterator[str]:
 def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[Lack]:
     """Yield what logs lack of single joints."""
     never = [one.joint for one in joints if len(one.smallest) < len(SIGNS)]
-    weak = [f"{one.joint} (now {_commands(one)} %)" for one in joints if _is_weak(one)]
-    fast = [
-        f"{one.joint} (now from {_least(one)} %)" for one in joints if _is_fast(one)
-    ]
+    weak = [one.joint for one in joints if _is_weak(one)]
+    fast = [f"{one.joint} (now {_least(one)} %)" for one in joints if _is_fast(one)]
     lacks = (
         ("both directions", never, "The logs command one of them only."),
         ("larger commands", weak, "Beyond, speeds are extrapolated."),
@@ -210,11 +213,11 @@ def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[Lack]:
 
 
 def _narrow(joints: Sequence[Covered]) -> list[str]:
-    """Return the joints of whose range the logs cover little, and how much."""
+    """Return the joints of whose range the logs cover little."""
     narrow = list[str]()
     for one in joints:
         if one.share is not None and one.share < MOST_TRAVEL:
-            narrow.append(f"{one.joint} (now {100 * one.share:.0f} % of its range)")
+            narrow.append(one.joint)
     return narrow
 
 
@@ -231,7 +234,7 @@ def _lacks_of_logs(run: FinishedRun, logs: Sequence[Log]) -> Iterator[Lack]:
     unseen = sum(not prediction.apart for prediction in run.validations.values())
     if unseen < LEAST_BLOCKS:
         why = f"There {'is' if unseen == 1 else 'are'} {unseen or 'none'}."
-        yield Lack("more unseen logs", f", {LEAST_BLOCKS} in all, to validate on", why)
+        yield Lack(f"{LEAST_BLOCKS} unseen logs", " in all, to validate on", why)
     if not run.settings.payloads:
         why = "No log has a payload: its effect is known from the model alone."
         yield Lack("a known load", " at the tip, if the machine is to carry any", why)
@@ -250,22 +253,18 @@ def _is_fast(one: Covered) -> bool:
     return any(one.smallest[sign] > SMALL for sign in driven)
 
 
-def _commands(one: Covered) -> str:
+def _commands(one: Covered, between: str = "to") -> str:
     low, high = one.ends[0]
-    return f"{_signed(low)} to {_signed(high)}"
+    return f"{_signed(low)} {between} {_signed(high)}"
 
 
-def _valid_commands(one: Covered) -> str:
-    """Write the commands that the logs cover: in two parts, if they leave out small
-    ones."""
-    if len(one.smallest) < len(SIGNS) or max(one.smallest.values()) <= SMALL:
-        return _commands(one)
-    low, high = one.ends[0]
-    parts = [
-        f"{_signed(low)} to {_signed(-one.smallest[-1.0])}",
-        f"{_signed(one.smallest[1.0])} to {_signed(high)}",
-    ]
-    return " and ".join(parts)
+def _none_below(joints: Sequence[Covered]) -> str:
+    """Say below which size the logs have no commands of any joint; nothing where they
+    have small ones."""
+    smallest = [size for one in joints for size in one.smallest.values()]
+    if not smallest or min(smallest) <= SMALL:
+        return ""
+    return f"; none below {min(smallest):.0f}"
 
 
 def _least(one: Covered) -> str:
@@ -277,15 +276,11 @@ def _positions(one: Covered) -> str:
     low, high = one.shown.factor * one.ends[1]
     if math.isnan(low):
         return "not measured"
-    return f"{_minus(low)} to {_minus(high)} {one.shown.unit}"
+    return f"{low:.0f} to {high:.0f} {one.shown.unit}"
 
 
 def _signed(value: float) -> str:
-    return f"{value:+.0f}".replace("-", "−").replace("+0", "0")
-
-
-def _minus(value: float) -> str:
-    return f"{value:.0f}".replace("-", "−")
+    return f"{value:+.0f}".replace("+0", "0")
 
 
 def _row(one: Covered) -> tuple[Cell, ...]:
@@ -299,6 +294,6 @@ def _row(one: Covered) -> tuple[Cell, ...]:
         _commands(one),
         _positions(one).removesuffix(f" {one.shown.unit}"),
         share,
-        f"{_minus(slowest)} to {_minus(fastest)}",
+        f"{slowest:.0f} to {fastest:.0f}",
         f"{forward:.0f} and {backward:.0f}",
     )

@@ -15,7 +15,7 @@ from hydroid.fitting.baselines import NAMES
 from hydroid.fitting.comparison import LEAST_BLOCKS
 from hydroid.fitting.validation import HORIZONS, Prediction
 from hydroid.fitting.verdict import JUDGED, THE_FIT, WORSE
-from hydroid.joint_verdict import Comparison, JointVerdict, Verdict
+from hydroid.joint_verdict import Comparison, JointVerdict, Outcome, Verdict
 from hydroid.reporting.page import Cell, Given, Section, Table, short_name
 from hydroid.search.descent import Ending
 from hydroid.settings.arm import Arm
@@ -35,13 +35,13 @@ _TESTED = (
     "Rms errors{unit} on {count} unseen log{s}{lengths}, which the fit did not use: 1, 5 and 10 s "
     "ahead, and over whole logs. In brackets: the error of the best simple model. Better, worse: "
     "than it. Cannot be told: the difference may be chance. "
-    "Good up to: the error over whole logs that is allowed, by default 2 % of travel."
+    "Allowed error: over whole logs, by default 2 % of travel."
 )
 _HOLDS = "Holds for free motion with the loads, the oil temperature and the engine speed of these logs. "
-_MARKS = "✗ and ! say which rule holds, not which error is larger: compare whole logs with good up to. "
+_MARKS = "✗ and ! say which rule holds, not which error is larger: compare whole logs with what is allowed. "
 _RULES = {
-    Verdict.PREDICTS: "within the tolerance over whole logs",
-    Verdict.MISFIT: "errs on the fitted logs by more than the tolerance and a simple model",
+    Verdict.PREDICTS: "within the allowed error over whole logs",
+    Verdict.MISFIT: "errs on the fitted logs by more than is allowed, and more than a simple model",
     Verdict.NO_BETTER: "after 1, 5 or 10 s worse than this simple model, and never better",
     Verdict.WORSE_THAN_FITTED: "over whole logs, errs more than twice as much on unseen as on fitted ones",
     Verdict.LITTLE: "errs by more than half of what standing still does",
@@ -54,8 +54,9 @@ WHOLE = "whole logs"
 """name of a column"""
 FITTED = "whole fitted logs"
 """name of the column of errors on the logs that the fit used"""
-GOOD = "good up to"
+ALLOWED = "allowed error"
 """name of the column of tolerances"""
+_BEYOND = "Furthest beyond its allowed error"
 
 _LEFT_OUT = "By joint: the rms error [deg] on parts of the logs, each predicted by a fit without it."
 
@@ -80,8 +81,8 @@ def verdict_table(fits: Verdicts, lengths: str = "") -> Table:
         unit = ""
         names.append("unit")
     if count:
-        names += [*map(column_of, JUDGED), WHOLE, FITTED, GOOD]
-        optional = (GOOD, FITTED, column_of(JUDGED[1]), WHOLE)
+        names += [*map(column_of, JUDGED), WHOLE, FITTED, ALLOWED]
+        optional = (ALLOWED, FITTED, column_of(JUDGED[1]), WHOLE)
         s = "s" if count > 1 else ""
         note = _TESTED.format(unit=unit, count=count, s=s, lengths=lengths)
         if count < LEAST_BLOCKS:
@@ -110,7 +111,7 @@ def _row(verdict: JointVerdict) -> dict[str, Cell]:
         "verdict": f"{verdict.verdict.sign} {verdict.text}",
         "unit": verdict.shown.unit,
         FITTED: _shown(verdict.fitted_deg, verdict.shown),
-        GOOD: _shown(verdict.tolerance_deg, verdict.shown),
+        ALLOWED: _shown(verdict.tolerance_deg, verdict.shown),
     }
 
 
@@ -208,16 +209,21 @@ def left_out_table(
 
 
 def verdict_sections(
-    fits: Verdicts, predictions: Sequence[Prediction], *steps: Finding
+    fits: Verdicts,
+    predictions: Sequence[Prediction],
+    *steps: Finding,
+    points: tuple[str, ...] = (),
 ) -> tuple[Section, ...]:
     """Return the sections that every page of predictions begins with: the verdicts, and
-    what to do next.
+    what to do next, with further `points`.
     """
     table = verdict_table(fits, _lengths(predictions))
     note = f"{_rules(fits)}{_HOLDS}{table.note} {_RIVALS}"
     table = replace(table, note=note)
     verdict = Section("Verdict", tables={"verdict": table})
-    return (verdict, Section("Next", steps=steps)) if steps else (verdict,)
+    if not steps:
+        return (verdict,)
+    return verdict, Section("Next", points=points, steps=steps)
 
 
 def _rules(fits: Verdicts) -> str:
@@ -384,23 +390,41 @@ def worst(verdicts: Sequence[JointVerdict]) -> str:
         return ""
     verdict = max(verdicts, key=_size)
     if not np.isfinite(_error(verdict)):
-        return f"Furthest outside its tolerance: {verdict.name}, whose simulation diverges."
+        return f"{_BEYOND}: {verdict.name}, whose simulation diverges."
     scale = verdict.shown.of_degrees(1.0)
     unit = verdict.shown.unit
     tolerance = two_digits(scale * verdict.tolerance_deg)
     # a joint without simple models has no logs either, and nothing beside it
     simple = min(verdict.baselines_deg.values(), default=0.0)
     error, least = told_apart(scale * _error(verdict), scale * simple)
-    where = "Furthest outside its tolerance"
+    where = _BEYOND
     if _size(verdict) <= 1.0:
-        where = "Nearest to its tolerance"
+        where = "Nearest to its allowed error"
     errs = "The best simple model errs by"
-    if simple < _error(verdict):
+    chance = ""
+    if _is_by_chance(verdict):
+        chance = "; the difference may be chance"
+    elif simple < _error(verdict):
         errs = "A simple model errs by less:"
     return (
         f"{where}: {verdict.name}, {error} {unit} (allowed {tolerance}, by default 2 % of "
-        f"travel). {errs} {least} {unit}."
+        f"travel). {errs} {least} {unit}{chance}."
     )
+
+
+def _is_by_chance(verdict: JointVerdict) -> bool:
+    """Return whether unseen logs leave open which errs less over whole logs, the fit or
+    the best simple model.
+
+    Errors on fitted logs are not compared.
+    """
+    if not verdict.unseen_logs or not verdict.baselines_deg:
+        return False
+    errors = verdict.baselines_deg
+    comparison = verdict.compared_whole.get(min(errors, key=errors.__getitem__))
+    if comparison is None or comparison.blocks < LEAST_BLOCKS:
+        return True
+    return comparison.outcome is Outcome.UNTOLD
 
 
 def next_step(

@@ -24,9 +24,9 @@ from hydroid.units import Display, display
 
 Actuator: TypeAlias = LinearActuator | RotaryActuator
 
-FARTHEST_BY_CYLINDER = 200.0
-"""how far a cylinder turns a joint at most, with a linkage such as a bucket's [deg];
-slewing gears and rotators turn farther"""
+FARTHEST_BY_CYLINDER = 270.0
+"""range of a joint up to which a cylinder may turn it [deg]: a bucket's linkage turns it
+by 200, and the ranges of files are generous. Slewing gears and rotators turn farther"""
 TIP_LOAD = "tip_load"  # name of the link that is a load at the tip
 SLIDE = 2  # MuJoCo's number of a joint that slides
 

@@ -149,6 +149,8 @@ def valve_openings(
     """
     driven = set(plugin.order[plugin.idle :].tolist())
     steps = len(commands) - plugin.past
+    # of one layout, for which `_push` is compiled once
+    by_joint = np.ascontiguousarray(commands.T)
     valves = _valves(plugin.coefficients)
 
     def of_joint(i: int, j: int) -> tuple[Plugin, Structs]:
@@ -159,7 +161,7 @@ def valve_openings(
 
     def push(i: int, j: int, side: str) -> Array:
         strokes = np.empty((steps, plugin.substeps))
-        _push(*of_joint(i, j), commands[:, j], side == "a", strokes)
+        _push(*of_joint(i, j), by_joint[j], side == "a", strokes)
         return strokes
 
     strokes_a, strokes_b = (

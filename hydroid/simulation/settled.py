@@ -274,11 +274,13 @@ def settled_commands(
     return command, reached
 
 
-def _call(rung: Rung, plugin: Plugin, *arguments: Any) -> None:
+def _call(rung: Rung, plugin: Plugin, poses: Poses, *arguments: Any) -> None:
     """Settle joints by the law of a rung."""
+    # of one layout, for which the law is compiled once
+    poses = Poses(*map(np.ascontiguousarray, poses))
     if not rung.has("pump_flow"):
         endless = plugin.coefficients.copy()
         endless["pump_flow"] = np.inf
         plugin = plugin._replace(coefficients=endless)
     law = LAWS[rung]
-    _compiled(law.rod, law.reaches)(plugin, *arguments)
+    _compiled(law.rod, law.reaches)(plugin, poses, *arguments)

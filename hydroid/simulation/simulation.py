@@ -342,7 +342,8 @@ class Simulation:
             # without inertia a joint is put where the log has it
             motion = servo.angle if self._at_once else servo.torque
             torque[:, :, served] = motion[:, None]
-        return torque.reshape(len(torque), -1)
+        # of one layout, for which the rollout is compiled once
+        return np.ascontiguousarray(torque.reshape(len(torque), -1))
 
 
 @contextmanager

@@ -32,7 +32,7 @@ TURNTABLE = """<mujoco model="turntable">
   </worldbody>
 </mujoco>"""
 """a house that turns 5 cm above its base, with a boom in front"""
-DESIGN = {"duration_s": 6, "effort": 24, "dwell_s": [0.5, 2], "poses": "any"}
+DESIGN = {"duration_s": 6, "effort": 12, "dwell_s": [0.5, 2], "poses": "any"}
 TWO: dict[str, object] = {
     f"parameters.{name}.fixed": TRUTH[name] for name in ("M1", "M4", "M5")
 }

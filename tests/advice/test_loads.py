@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import SMALL
 from made_logs import noisy
 from two_joints import FIT, TRUTH, drive, two_joints
 
@@ -18,6 +19,7 @@ from hydroid.settings.arm import TIP_LOAD
 from hydroid.settings.fit import FitSettings
 
 MASS = 150.0
+pytestmark = pytest.mark.usefixtures("no_report")
 
 
 def loaded(settings: FitSettings, seed: int, mass: float = MASS) -> Log:
@@ -90,6 +92,7 @@ def test_validate_proposes_the_load_of_a_log_that_errs_with_its_interval(tmp_pat
     fitted = hydroid.fit_hyd(
         [drive(settings, 0), drive(settings, 1)],
         config=tmp_path / "fit.yaml",
+        set=SMALL,
         out=tmp_path / "run",
     )
     plain = hydroid.validate(replace(drive(settings, 5), source="b.csv"), fit=fitted)

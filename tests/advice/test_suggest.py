@@ -28,9 +28,9 @@ LEVELS = [0.0, 60.0, -40.0, 80.0, -70.0, 30.0, -20.0, 50.0]
 
 
 def make_settings(**hydraulics: float) -> FitSettings:
-    settings = load_settings(
-        "fit-hyd", {f"hydraulics.{name}": v for name, v in hydraulics.items()}
-    )
+    changes: dict[str, object] = {"design.duration_s": 10}
+    changes |= {f"hydraulics.{name}": v for name, v in hydraulics.items()}
+    settings = load_settings("fit-hyd", changes)
     quantities = {"A_A": "area_a", "A_B": "area_b", "D": "damping"}
     free = {
         name: ParameterSettings(
@@ -42,7 +42,7 @@ def make_settings(**hydraulics: float) -> FitSettings:
 
 
 def make_log(settings: FitSettings, noise_deg: float = 0.1) -> Log:
-    return noisy(stepped(settings, TRUTH, LEVELS), noise_deg, 1)
+    return noisy(stepped(settings, TRUTH, LEVELS, 0.5), noise_deg, 1)
 
 
 def at_truth(truth: FitSettings, model: FitSettings) -> tuple[Problem, Uncertainty]:

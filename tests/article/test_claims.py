@@ -77,6 +77,14 @@ def test_only_seeds_that_both_cells_have_are_compared():
     assert verdict.seeds == 6
 
 
+@pytest.fixture
+def no_power(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How many seeds would be enough takes a verdict most of its time, and is no part of
+    its outcome."""
+    monkeypatch.setattr("claims.power", lambda *_: 1.0)
+
+
+@pytest.mark.usefixtures("no_power")
 def test_claims_of_an_item_are_wrong_together_in_one_of_twenty_studies():
     claims, wrong = (
         [CLAIM.model_copy(update={"says": f"{i}", "column": f"{i}"}) for i in range(4)],
@@ -108,6 +116,7 @@ def test_holm_asks_less_of_the_next_claim_once_one_is_decided():
     )
 
 
+@pytest.mark.usefixtures("no_power")
 @pytest.mark.parametrize(
     ("effect", "deviation", "seeds"), [(np.log(0.5), 0.8, 12), (0.0, 0.2, 12)]
 )

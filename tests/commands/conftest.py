@@ -28,7 +28,7 @@ def array(
     log = head(folder / "a.csv", 400)
     small = SMALL | {
         "refinement.iterations": 1,
-        "design": {"effort": 3, "poses": "any"},
+        "design": {"effort": 3, "poses": "any", "clearance_m": None},
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(page_file, "write_page", lambda *_: [])  # figures take longest

@@ -13,6 +13,7 @@ import pytest
 import yaml
 from command_line import Run
 from conftest import SMALL
+from log_files import head
 
 import hydroid
 from hydroid.commands.app import click_command
@@ -32,6 +33,7 @@ QUICK = [
     "--set=refinement.iterations=1",
 ]
 GA = ["--algorithm", "ga"]
+SHORT_DESIGN = "--set=design={effort: 3, poses: any, duration_s: 6}"
 VALUES = {
     "D": 80.0,
     "S": 0.0,
@@ -64,8 +66,8 @@ def test_a_command_writes_what_its_help_promises(
     for name, options in {
         "validate": [short],
         "analyse": [],
-        "suggest": [],
-        "design": ["--set=design.effort=3", "--set=design.poses=any"],
+        "suggest": [SHORT_DESIGN],
+        "design": [SHORT_DESIGN],
     }.items():
         hydroid_cli(name, *options, "--fit", "fit-mech", "--out", name)
     for name in ("fit-mech", "validate", "analyse", "suggest", "design"):
@@ -154,8 +156,7 @@ def test_fit_validate_and_simulate_walk_through(
     assert done["results"][0]["max_deg"] < 1e-6
     assert done["verdict"][0]["unseen_deg"] is None
     assert not [*run.glob("validations/*")]
-    rows = (ROOT / "examples" / "logs" / "rig_shoulder_2.csv").read_text().splitlines()
-    (tmp_path / "other.csv").write_text("\n".join(rows[:600]) + "\n")
+    head(tmp_path / "other.csv", 600, "rig_shoulder_2.csv")
     hydroid_cli("validate", "other.csv", "--fit", "run", "--out", "val2")
     # the fit's own report shows it
     (kept,) = run.glob("validations/other.csv-*/result.npz")
@@ -179,6 +180,7 @@ def test_a_log_that_is_given_twice_is_refused(
     assert "holds the same samples as short.csv; leave one of them out" in done.err
 
 
+@pytest.mark.usefixtures("no_report")
 def test_the_logs_of_the_fits_that_a_fit_began_from_are_seen(
     short: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -186,9 +188,9 @@ def test_the_logs_of_the_fits_that_a_fit_began_from_are_seen(
     monkeypatch.chdir(tmp_path)
     rows = (ROOT / "examples" / "logs" / "rig_shoulder_2.csv").read_text().splitlines()
     logs = {"first": short}
-    for name, first in {"second": 1, "third": 1001, "other": 2001}.items():
+    for name, first in {"second": 1, "third": 501, "other": 1001}.items():
         logs[name] = tmp_path / f"{name}.csv"
-        logs[name].write_text("\n".join([rows[0], *rows[first : first + 900]]) + "\n")
+        logs[name].write_text("\n".join([rows[0], *rows[first : first + 400]]) + "\n")
     tiny = {"search.ga.population": 4, "search.ga.generations": 1}
     quick = {"algorithm": "ga", "refinement": False, "set": tiny}
     hydroid.fit_mech(logs["first"], out="first", **quick)
@@ -209,7 +211,7 @@ def test_a_log_set_apart_stays_on_the_page_and_out_of_the_verdict(
     array, hydroid_cli: Run
 ):
     shutil.copytree(array[0] / "seed-1", "run")
-    other = ROOT / "examples" / "logs" / "rig_shoulder_2.csv"
+    other = head(Path("rig_shoulder_2.csv"), 600, "rig_shoulder_2.csv")
     counts = {}
     for options in (["--apart"], []):
         done = hydroid_cli(
@@ -322,9 +324,7 @@ def test_a_fit_in_memory_steps_predicts_validates_reports_and_tables_itself(
     assert fitted.report(tmp_path / "page").stat().st_size > 0
 
 
-def test_analyse_tells_what_a_log_determines(
-    short: Path, hydroid_cli: Run, tmp_path: Path
-):
+def test_analyse_tells_what_a_log_determines(array, hydroid_cli: Run, tmp_path: Path):
     values = tmp_path / "values.yaml"
     values.write_text(
         "{K: 1.5, D: 400, S: 80, M1: 4.6, M2: 5.1, M3: 22.5, M4: 1.6, M5: 4.0, M6: 4.7}"
@@ -332,7 +332,7 @@ def test_analyse_tells_what_a_log_determines(
     how = ["--fit", values, "--profile", "S"]
     done = hydroid_cli(
         "analyse",
-        short,
+        array[0] / "a.csv",
         *how,
         "--set",
         "objective.noise_deg=0.5",

@@ -140,8 +140,8 @@ def simulate(
     """Angles [rad], (n, T + 1), of one joint under commands (T,), with `steps` MuJoCo
     steps a sample.
 
-    It is the pendulum on its cylinder, or another. `observe` receives an Observation,
-    shapes (n, 1), and the velocity [rad/s], (n, 1), after each sample.
+    It is the pendulum on its cylinder, or another. `observe` receives of each candidate
+    an Observation, shapes (T, 1), and the velocities [rad/s], (T, 1), after its samples.
     """
     model, n, samples = pendulum() if model is None else model, len(p), len(command)
     model.opt.timestep = PERIOD / steps
@@ -165,9 +165,9 @@ def simulate(
             course = Course(held, np.empty((samples * steps, 0)))
             arm.roll(one, state[i], course, Trace(angle[i, 1:], states[i]))
     if observe is not None:
-        for t in range(samples):
-            seen = observed(plugin.coefficients, states[:, t], angle[:, t + 1])
-            observe.append((seen, states[:, t]["velocity"]))
+        for i in range(n):
+            seen = observed(plugin.candidate(i).coefficients, states[i], angle[i, 1:])
+            observe.append((seen, states[i]["velocity"]))
     return angle[:, :, 0]
 
 
@@ -176,11 +176,9 @@ def watched(p: Records, command: np.ndarray, settings: HydraulicSettings, **how)
     what it did."""
     seen: list = []
     angle = simulate(p, command, settings, observe=seen, **how)[0]
-    fields = {
-        f.name: np.array([getattr(o, f.name)[0, 0] for o, _ in seen])
-        for f in fields_of(Observation)
-    }
-    return angle, Observation(**fields), np.array([v[0, 0] for _, v in seen])
+    first, velocity = seen[0]
+    fields = {f.name: getattr(first, f.name)[:, 0] for f in fields_of(Observation)}
+    return angle, Observation(**fields), velocity[:, 0]
 
 
 def valve_curve(share: float, exponent: float, factors: list[float]) -> float:

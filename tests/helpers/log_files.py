@@ -50,8 +50,8 @@ def save(path: Path, rows: list[list[str]], separator: str = ",") -> Path:
     return path
 
 
-def head(path: Path, samples: int) -> Path:
-    rows = (RIG / "rig_shoulder_1.csv").read_text().splitlines()
+def head(path: Path, samples: int, log: str = "rig_shoulder_1.csv") -> Path:
+    rows = (RIG / log).read_text().splitlines()
     path.write_text("\n".join(rows[: samples + 1]) + "\n")
     return path
 

@@ -30,10 +30,10 @@ GOOD |= {EXAMPLES / "boom/fit.yaml": "boom/*.csv"}
 def test_good_logs_have_none_of_these_findings(config: str | Path) -> None:
     logs = sorted(EXAMPLES.glob(GOOD[config]))
     assert logs
-    findings = [
-        one for log in hydroid.check(logs, config=config).result for one in log.findings
-    ]
-    assert not [str(one) for one in findings if one.kind in KINDS]
+    # one by one: logs that are given together are compared as well, which takes longest
+    for log in logs:
+        (checked,) = hydroid.check(log, config=config).result
+        assert not [str(one) for one in checked.findings if one.kind in KINDS]
 
 
 TIME = 0.02 * np.arange(1000)

@@ -104,3 +104,17 @@ def test_a_measurement_adds_its_information_and_some_of_the_parameters_keep_thei
 def test_the_flag_tells_what_the_logs_alone_determine(sd, share, flag, source):
     assert flag_of(sd, share) is flag
     assert ParameterStatus(flag, share=share, known=sd <= 1).source is source
+
+
+def test_a_quantity_that_a_change_takes_away_is_not_known_and_spoils_no_other():
+    def quantities(theta: np.ndarray) -> np.ndarray:
+        # the second one has no value beside the estimate
+        lost = np.where(theta[:, 0] == THETA[0], theta[:, 0], np.nan)
+        return np.stack([theta[:, 0], lost], axis=1)
+
+    found = known().propagate(quantities, positive=True)
+    assert np.isfinite(found.sd).tolist() == [True, False]
+    # the prior's share of it is asked of these slopes again
+    sd = known().sd(found.slopes)
+    np.testing.assert_allclose(sd[0], found.sd[0])
+    assert np.isnan(sd[1])

@@ -89,6 +89,7 @@ def test_each_side_of_a_valve_starts_where_the_logs_show_it(place: Path):
         assert settings.terms_of(settings.outputs[0]) == ("curve_swing",)
 
 
+@pytest.mark.usefixtures("short_searches")
 def test_a_valve_that_is_open_or_shut_gets_no_curve(place: Path, tmp_path: Path):
     table = np.genfromtxt(
         place / "move_0.csv", delimiter=",", names=True, deletechars=""
@@ -163,6 +164,7 @@ def test_a_project_is_replaced_if_that_is_asked_for(tmp_path: Path):
     }
 
 
+@pytest.mark.usefixtures("short_searches")
 def test_a_telescopes_column_is_its_own(tmp_path: Path):
     """Columns in m go to the joint that slides; a bucket that nothing names is asked
     for."""
@@ -259,6 +261,7 @@ def fill_in(path: Path, joints: Sequence[str]) -> None:
     path.write_text(before + section + end + after)
 
 
+@pytest.mark.usefixtures("short_searches")
 def test_a_log_of_unknown_columns_gets_a_skeleton_and_goes_on_from_there(
     place: Path, tmp_path: Path
 ):
@@ -351,6 +354,7 @@ def test_a_log_in_which_nothing_is_driven_and_moves_is_refused(
     assert not (tmp_path / "mine").exists()
 
 
+@pytest.mark.usefixtures("short_searches")
 def test_a_joint_that_no_fitted_log_drives_is_not_compared(place: Path, tmp_path: Path):
     def only_the_boom(rows: list[list[str]]) -> None:
         for row in rows[1:]:
@@ -406,6 +410,7 @@ ROWS = count(-99)
 """0 at the hundredth"""
 
 
+@pytest.mark.usefixtures("short_searches")
 @pytest.mark.parametrize(
     ("column", "change", "note", "scale"),
     [
@@ -448,6 +453,7 @@ def test_what_the_numbers_of_a_log_tell_is_said(
     ]
 
 
+@pytest.mark.usefixtures("short_searches")
 def test_a_joint_that_moves_without_a_command_follows_the_log(
     place: Path, tmp_path: Path
 ):
@@ -476,6 +482,7 @@ def test_the_command_prints_what_it_assumed_and_what_is_next(
     assert load_arm(tmp_path / "mine" / "arm.yaml").name == "digger"
 
 
+@pytest.mark.usefixtures("short_searches")
 def test_a_log_may_count_joints_in_its_own_order(place: Path, tmp_path: Path):
     """The log's joint 1 is the arm's boom; an arm's file that one has is used as it
     is."""

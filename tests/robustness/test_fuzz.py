@@ -38,6 +38,7 @@ COUNTS = dict.fromkeys(FORMATS, 15) | {
 HEADER = logs()[0].split(b"\n", 1)[0]
 
 
+@pytest.mark.usefixtures("short_searches")
 @pytest.mark.parametrize("name", COUNTS)
 def test_damaged_files_are_read_rightly_or_refused_in_one_line(
     name: str, tmp_path, monkeypatch
@@ -54,6 +55,7 @@ def test_damaged_files_are_read_rightly_or_refused_in_one_line(
     assert not all(accepted)
 
 
+@pytest.mark.usefixtures("short_searches")
 @pytest.mark.parametrize(
     "name", ["log", "config", "arm", "mesh", "values", "model", "urdf", "mjcf"]
 )

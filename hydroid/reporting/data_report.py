@@ -20,6 +20,8 @@ from hydroid.words import listed, three_digits, two_digits
 TITLE = "Data"
 VALIDITY = "Range of validity"
 """how the title begins of the section that has commands by joint, and what logs lack"""
+NO_BREAK = "\u00a0"
+"""blank at which no line ends"""
 EVEN = 0.02
 """part of the usual step by which others may differ from it and are even"""
 STANDS = 0.2
@@ -147,7 +149,9 @@ def _motion(settings: FitSettings, log: Log, joint: int) -> str:
     if not log.drives(joint):
         return f"{moved} (no command)"
     low, high = largest_commands([log], joint)
-    return f"{moved} ({_signed(low)} to {_signed(high)} %)"
+    # one word to a browser: a phone shows a line a row
+    commands = f"({_signed(low)} to {_signed(high)} %)".replace(" ", NO_BREAK)
+    return f"{moved} {commands}"
 
 
 def _signed(value: float) -> str:

@@ -1,7 +1,7 @@
 """What the model of a fit contains: which effects of a machine are in it, which were
 tried and dropped, and which it lacks."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -30,7 +30,7 @@ _TEXT = (
     "ask for what the settings switch off or hold."
 )
 _GAIN = (
-    "gain: rise of the log-likelihood of parts of the logs that were left out, ± its standard "
+    " Gain: rise of the log-likelihood of parts of the logs that were left out, ± its standard "
     "error. An effect is kept if the rise exceeds 3, and 1.64 standard errors."
 )
 _TABLES = {
@@ -195,6 +195,16 @@ class _Of:
     value: float | None = None
 
 
+@dataclass(frozen=True)
+class _Trial:
+    """A term that was dropped: its quantities, each side by itself, the name of its
+    joint if it is of one, and what it gained in words."""
+
+    sides: frozenset[str]
+    joint: list[str]
+    gained: str
+
+
 def model_section(run: FinishedRun) -> Section:
     """Return the folded section of the effects that the model of a run contains."""
     effects = contained(run)
@@ -202,11 +212,13 @@ def model_section(run: FinishedRun) -> Section:
     for state, (file, title, column) in _TABLES.items():
         rows = tuple((one.name, one.how) for one in effects if one.state == state)
         if rows:
-            note = _GAIN if state == REJECTED else ""
-            tables[file] = Table(title, ("effect", column), rows, note)
+            tables[file] = Table(title, ("effect", column), rows)
+    text = _TEXT.format(parameters=PARAMETERS)
+    if any(one.state == REJECTED or REJECTED in one.how for one in effects):
+        text += _GAIN
     return Section(
         TITLE,
-        _TEXT.format(parameters=PARAMETERS),
+        text,
         tables=tables,
         folded=True,
         answer=_answer(run.settings, effects),
@@ -239,7 +251,7 @@ def _is_of(settings: FitSettings, effect: Effect) -> bool:
 
 
 def _stated(
-    settings: FitSettings, effect: Effect, trials: Mapping[str, Sequence[str]]
+    settings: FitSettings, effect: Effect, trials: Sequence[_Trial]
 ) -> Contained:
     """Return what a fit has of an effect that quantities stand for."""
     if effect.decides == ("mass",):
@@ -248,8 +260,7 @@ def _stated(
         how = "rigid" if settings.rung.at_once else "stiff"
         return Contained(effect.name, IN, f"{how}, at the ends of each joint's range")
     places = [*_places(settings, effect)]
-    tried = [words for side in _sides(effect) for words in trials.get(side, ())]
-    tested = "; ".join(dict.fromkeys(tried))
+    tested = _tested(settings, effect, trials)
     if all(place.state == OFF for place in places):
         if tested:
             return Contained(effect.name, REJECTED, tested)
@@ -258,6 +269,20 @@ def _stated(
     if tested:
         ways.append(f"{REJECTED}: {tested}")
     return Contained(effect.name, IN, "; ".join(ways))
+
+
+def _tested(settings: FitSettings, effect: Effect, trials: Sequence[_Trial]) -> str:
+    """Say what the trials of an effect gained, where the final model could have it."""
+    sides = _sides(effect).keys() - settings.rung.lacks
+    joints = dict[str, list[str]]()
+    for trial in trials:
+        if not sides.isdisjoint(trial.sides):
+            joints.setdefault(trial.gained, []).extend(trial.joint)
+    told = [
+        f"{listed(names)}: {gained}" if names else gained
+        for gained, names in joints.items()
+    ]
+    return "; ".join(told)
 
 
 def _places(settings: FitSettings, effect: Effect) -> Iterator[_Of]:
@@ -352,7 +377,7 @@ def _value(effect: Effect, places: Sequence[_Of]) -> str:
     has several."""
     value = places[0].value
     is_shared = all(place.value == value for place in places)
-    if value is None or not is_shared or len(effect.decides) > 1:
+    if value is None or not is_shared or effect.decides[1:]:
         return ""
     unit = CHOICES[effect.decides[0]].unit
     return f" at {plain(value)} {unit}".rstrip()
@@ -403,7 +428,7 @@ def _motion(run: FinishedRun) -> Iterator[Contained]:
     settings = run.settings
     name = "inertia of the links"
     if not settings.rung.at_once:
-        yield Contained(name, IN, "of masses and shapes")
+        yield Contained(name, IN, "from the masses and shapes of the links")
         return
     others = [
         rung.name
@@ -451,24 +476,23 @@ def _coupling(
     yield Contained("joints coupled by the arm's weight and motion", IN, how)
 
 
-def _dropped(run: FinishedRun) -> dict[str, list[str]]:
-    """Return of quantities, each side by itself, the trials in words of the terms that
-    the final model does not have."""
+def _dropped(run: FinishedRun) -> list[_Trial]:
+    """Return the trials of the terms that the final model does not have."""
     begun = run.begun or run.settings
     kept = step_of(run.summary.final or "").terms
-    trials = dict[str, list[str]]()
+    trials = list[_Trial]()
     for term in begun.terms():
         if term in kept:
             continue
         own = [one for one in begun.parameters.values() if one.term == term]
         joints = {joint for one in own for joint in one.joints or ()}
-        words = _trial_words(run.summary, term)
-        if len(joints) == 1:
-            words = f"{begun.arm.name_of(*joints)}: {words}"
-        for side in dict.fromkeys(
-            side for one in own for side in TARGETS[one.quantity]
-        ):
-            trials.setdefault(side, []).append(words)
+        trials.append(
+            _Trial(
+                sides=frozenset(side for one in own for side in TARGETS[one.quantity]),
+                joint=[begun.arm.name_of(*joints)] if len(joints) == 1 else [],
+                gained=_trial_words(run.summary, term),
+            )
+        )
     return trials
 
 
@@ -484,9 +508,9 @@ def _trial_words(summary: FitSummary, term: str) -> str:
     if term in summary.tried:
         gained, was_tried = summary.tried[term], True
         if gained is None:
-            return "it promised too little to be fitted, or only noise was left"
+            return "not fitted: it promised too little, or only noise was left"
     if not was_tried:
-        return "it was not kept; what it gained is not stored"
+        return "not kept; what it gained is not stored"
     return gain_words(gained)
 
 
@@ -514,7 +538,9 @@ def _answer(settings: FitSettings, effects: Sequence[Contained]) -> str:
         return listed([settings.arm.name_of(place.joint) for place in joints])
 
     answers = [f"dry friction: {said(FRICTION)}"]
-    if settings.stage == "hyd":
+    if settings.stage == "mech":
+        answers.append("hydraulics: one gain")
+    else:
         answers += [f"compressible oil: {said(OIL)}", f"pump saturates: {said(PUMP)}"]
     if SHARED in by_name:
         state = by_name[SHARED].state

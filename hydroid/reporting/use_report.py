@@ -8,7 +8,8 @@ from hydroid.reporting.data_report import TITLE as DATA, VALIDITY
 from hydroid.reporting.page import Cell, Section, Table
 from hydroid.reporting.parameters_report import direction_word
 from hydroid.run.record import FinishedRun
-from hydroid.settings.log import ColumnMap, log_file
+from hydroid.settings.arm import Joint
+from hydroid.settings.log import LENGTHS, ColumnMap, log_file
 from hydroid.words import listed, plain
 
 TITLE = "How to use it"
@@ -45,8 +46,8 @@ _HEADER = (
 )
 _NOTE = (
     "Files have the columns, units and signs of the fitted logs, and the time in the column "
-    "{time} [{unit}]. Positive is what the model and Python call so. Python takes commands in %, "
-    "and returns angles in rad, positions in m, pressures in Pa."
+    "{time}, in {unit}. Positive: as the model and Python have it, after the scale of this table. "
+    "Python takes commands in %, and returns angles in rad, positions in m, pressures in Pa."
 )
 
 
@@ -100,13 +101,13 @@ def _row(run: FinishedRun, joint: int) -> tuple[Cell, ...]:
     unit = one.shown.setting
     ends = "no ends"
     if not one.continuous:
-        low, high = map(plain, one.range)
+        low, high = (plain(float(f"{end:.4g}")) for end in one.range)
         ends = f"{low} to {high} {unit}".replace("-", "−")
     return (
         one.name,
-        _column(command, "command [%]"),
+        _column(command, "command"),
         positive_command(run, joint),
-        _column(angle, f"{one.shown.word} [{unit}]"),
+        _column(angle, _measured(one, angle)),
         ends,
     )
 
@@ -115,13 +116,21 @@ def _column(columns: ColumnMap | None, what: str) -> str:
     """Write the columns of a quantity, and how their cells become it."""
     if columns is None:
         return "none"
-    text = f"{' / '.join(columns.column)} [{columns.unit}]"
+    names = " / ".join(columns.column)
     if (columns.scale, columns.offset) == (1.0, 0.0):
-        return text
+        return f"{names}: {what} in {columns.unit}"
     sign = "−" if columns.offset < 0 else "+"
     offset = f" {sign} {plain(abs(columns.offset))}" if columns.offset else ""
     scale = plain(columns.scale).replace("-", "−")
-    return f"{text}; {what} = {scale} · cell{offset}"
+    return f"{names}: {what} [{columns.unit}] = {scale} · cell{offset}"
+
+
+def _measured(joint: Joint, angle: ColumnMap | None) -> str:
+    """Say what the column of a joint's angle holds."""
+    is_length = angle is not None and angle.unit in LENGTHS
+    if is_length and not joint.slides:
+        return "length of the cylinder"
+    return joint.shown.word
 
 
 def positive_command(run: FinishedRun, joint: int) -> str:

@@ -9,7 +9,8 @@ from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.fitting.validation import Prediction
 from hydroid.log import FileRows, Log
-from hydroid.reporting.data_report import data_section, driven_together
+from hydroid.reporting.data_report import NO_BREAK, data_section, driven_together
+from hydroid.reporting.page import Table
 from hydroid.run.record import FinishedRun
 from hydroid.settings.log import EngineSpeed
 
@@ -37,6 +38,11 @@ def run_of(
     return replace(RECORD, result=result, validations=validations)
 
 
+def lines(table: Table) -> list[list[str]]:
+    """The cells of a table, with blanks of one kind."""
+    return [[cell.replace(NO_BREAK, " ") for cell in row] for row in table.shown]
+
+
 def test_each_log_says_how_it_was_recorded_and_which_joint_moves_how_far():
     fitted = log_of([50.0, -30.0], [0.0])
     fitted = replace(fitted, rows=FileRows(201, (0.018, 0.02, 0.031)))
@@ -47,7 +53,7 @@ def test_each_log_says_how_it_was_recorded_and_which_joint_moves_how_far():
     section = data_section(run)
     table = section.tables["logs"]
     assert table.header[-2:] == ("shoulder [deg]", "elbow [deg]")
-    first, second = table.shown
+    first, second = lines(table)
     travel = np.degrees(np.ptp(fitted.angle[:, 1]))
     assert first[:5] == ["a.csv", "fitted", "4", "201", "50, steps 18 to 31 ms"]
     assert first[5:] == [f"{travel:.2g} (−30 to +50 %)", "stands"]
@@ -129,7 +135,7 @@ def test_a_telescope_moves_by_millimetres(tmp_path):
     section = data_section(run)
     table = section.tables["logs"]
     assert table.header[-1] == "telescope [mm]"
-    assert table.rows[0][-1] == "1250 (−50 to +50 %)"
+    assert lines(table)[0][-1] == "1250 (−50 to +50 %)"
     # one joint is never together with others
     assert "Joints together" not in " ".join(section.points)
     assert "two or more" not in section.answer

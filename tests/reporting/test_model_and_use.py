@@ -119,6 +119,12 @@ def test_a_term_that_was_dropped_says_what_it_gained():
     assert bends.state == REJECTED
     assert bends.how == "shoulder: gain 2 ± 4, not clear"
     assert effects[SHARED].state == OUT
+    # a term that the final model cannot have was not rejected
+    begun = settings_of(
+        {"ring": {"quantity": "oil_frequency", "fixed": 3.0, "term": "oil"}}
+    )
+    run = run_with(begun.of_estimate("dynamic"), begun, final="dynamic")
+    assert by_name(run)[OIL.name] == Contained(OIL.name, IN, "held")
     effects = dropped(tried={"curve_shoulder": None})
     assert "promised too little" in effects["bends in the valve's curve"].how
     # older runs do not say
@@ -131,7 +137,7 @@ def test_a_fit_of_stage_1_lacks_all_hydraulics_in_one_row():
     assert lacked.state == OUT
     assert not {OIL.name, PUMP.name} & {one.name for one in effects}
     assert by_name(RECORD)["torque in proportion to the command"].how == "estimated"
-    assert model_section(RECORD).answer == "dry friction: no"
+    assert model_section(RECORD).answer == "dry friction: no; hydraulics: one gain"
 
 
 def test_every_state_has_a_table_and_none_is_empty():
@@ -170,8 +176,8 @@ def test_columns_and_signs_are_those_of_the_logs():
     settings = PROBLEM.settings.changed({"log.joints": joints})
     run = run_with(settings, joints=(2,))
     ((joint, command, _, angle, ends),) = use_section(run).tables["units"].rows
-    assert (joint, angle, ends) == ("shoulder", "q2_deg [deg]", "−30 to 90 deg")
-    assert command == "lever_V [%]; command [%] = −10 · cell + 5"
+    assert (joint, angle, ends) == ("shoulder", "q2_deg: angle in deg", "−30 to 90 deg")
+    assert command == "lever_V: command [%] = −10 · cell + 5"
 
 
 def test_a_telescope_is_in_metres_and_extends(tmp_path):
@@ -184,7 +190,7 @@ def test_a_telescope_is_in_metres_and_extends(tmp_path):
     run = run_with(settings, curves=curves, joints=(2,))
     ((joint, _, moves, angle, ends),) = use_section(run).tables["units"].rows
     assert (joint, moves) == ("telescope", "extending, position rises")
-    assert (angle, ends) == ("x [mm]", "0 to 3 m")
+    assert (angle, ends) == ("x: position in mm", "0 to 3 m")
 
 
 @pytest.mark.parametrize("stage", ["mech", "hyd"])

@@ -19,6 +19,7 @@ from hydroid.reporting.actuator_report import (
     speed_section,
     step_section,
 )
+from hydroid.reporting.actuator_tables import RESPONSE_HEADER
 from hydroid.reporting.analysis import analysis_page
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.correlation_report import (
@@ -95,7 +96,7 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
             f"{word} {0.24 * abs(end):.2g}{unit} at {sign}{abs(end):.0f} %"
             for word, sign, end, unit in (
                 ("positive", "+", ends.max(), " deg/s"),
-                ("negative", "−", ends.min(), ""),
+                ("negative", "-", ends.min(), ""),
             )
         ]
         said.append(f"{name} {', '.join(tops)}")
@@ -132,20 +133,27 @@ def test_the_valve_s_dead_bands_stand_beside_its_heading():
         }
     )
     one = SUMMARY.estimate["K"]
-    estimate = {name: one.changed({"value": value}) for name, value in bands.items()}
+    estimate = {
+        name: one.changed({"value": value, "interval": (value - 2.0, value + 2.0)})
+        for name, value in bands.items()
+    }
     summary = SUMMARY.changed({"curves": curves, "estimate": estimate})
     section = speed_section(settings, summary, PROBLEM.logs)
     assert section is not None
     assert section.title.startswith("Valve: dead band")
-    said = "dead band: shoulder +12 and −8.5 % and elbow +0 and −5 % (fixed); the model's speed"
-    assert section.answer.startswith(said)
-    stated = SUMMARY.quantities["shoulder_dead_band"].changed({"value": 15.0})
+    said = "dead band [%]: shoulder +12 ± 2 and -8.5, elbow +0 and -5 (fixed)"
+    # the logs have no command of the shoulder from 12 to 16 %
+    assert section.answer == f"{said}; extrapolated below 16"
+    stated = SUMMARY.quantities["shoulder_dead_band"].changed(
+        {"value": 15.0, "interval": (5.0, 40.0), "data_share": 0.2}
+    )
     quantities = {"shoulder_dead_band_positive": stated}
     section = speed_section(
         settings, summary.changed({"quantities": quantities}), PROBLEM.logs
     )
     assert section is not None
-    assert section.answer.startswith("dead band: shoulder +15 and −8.5 % and elbow")
+    said = "dead band [%]: shoulder +15 (5.0 to 40) (mostly prior) and -8.5, elbow"
+    assert section.answer.startswith(said)
 
 
 def test_step_and_frequency_response_stand_where_a_fit_states_them():
@@ -173,9 +181,11 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     assert direction_word(summary, "shoulder", "negative") == ""
     section = step_section(SETTINGS, summary)
     assert section is not None
+    # a phase of 3 to 1 deg turns no further
+    assert section.answer == "-90° at over 0.5 Hz (shoulder)"
     # from 3 to 3 / √2, between 0.5 and 1 Hz
-    answer = "in the slower direction: bandwidth (-3 dB): shoulder 0.9 Hz"
-    assert section.answer == answer
+    row = dict(zip(RESPONSE_HEADER, section.tables["responses"].rows[0], strict=True))
+    assert row["bandwidth (-3 dB) [Hz]"] == "0.9"
     (tab,) = section.tabs
     chart = tab.make()
     assert [(panel.log_x, panel.log_y) for panel in chart.panels] == [

@@ -215,6 +215,27 @@ def test_residuals_are_tested_of_each_joint_and_of_none_that_diverged():
     )
 
 
+def test_the_residuals_heading_says_how_long_what_is_left_of_an_error_lasts():
+    """Where they are not white, of the joint whose error lasts longest."""
+    predictions = fitted(FIT)
+    slow = np.sin(0.05 * np.arange(len(predictions[0].log.time)))[:, None]
+    wrong = [replace(one, response=one.response + slow) for one in predictions]
+
+    def answer(*seconds: float) -> str:
+        lasting = {
+            name: error.changed({"lasts_s": time})
+            for (name, error), time in zip(SUMMARY.errors.items(), seconds, strict=True)
+        }
+        summary = SUMMARY.changed({"errors": lasting})
+        section = residual_section(SETTINGS, summary, wrong)
+        assert section is not None
+        return section.answer
+
+    start = "no, so intervals may be too narrow; "
+    assert answer(0.2, 1.4) == f"{start}what is left of the elbow's error lasts 1.4 s"
+    assert answer(0.0, 0.0).startswith(f"{start}autocorrelation up to ")
+
+
 def test_a_prior_and_what_the_logs_made_of_it_are_in_its_standard_deviations():
     free = {"K": {"nominal": 0.25, "sd": 0.05}, "D": {"nominal": 100.0, "within": 3.0}}
     parameters = {

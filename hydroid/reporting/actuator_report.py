@@ -417,7 +417,7 @@ def _slower(names: Sequence[str], summary: FitSummary) -> str:
         answers.append(f"dead time [s]: {', '.join(late)}")
     if turned:
         first = min(turned, key=lambda name: turned[name].frequency)
-        answers.append(f"{TURNED:g}° at {turned[first].short} Hz ({first})")
+        answers.append(f"lag {-TURNED:g}° at {turned[first].short} Hz ({first})")
     return "; ".join(answers)
 
 

@@ -182,7 +182,7 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     section = step_section(SETTINGS, summary)
     assert section is not None
     # a phase of 3 to 1 deg turns no further
-    assert section.answer == "-90° at over 0.5 Hz (shoulder)"
+    assert section.answer == "lag 90° at over 0.5 Hz (shoulder)"
     # from 3 to 3 / √2, between 0.5 and 1 Hz
     row = dict(zip(RESPONSE_HEADER, section.tables["responses"].rows[0], strict=True))
     assert row["bandwidth (-3 dB) [Hz]"] == "0.9"

@@ -31,7 +31,7 @@ SHOTS = {
     "report_motion": ("mech/report.html", ".beside", (1000, 420), "light"),
     "report_speed": (
         "hyd/report.html",
-        "Valve: dead band, opening, and speed against command",
+        "Valve: dead band and speed",
         (1000, 760),
         "light",
     ),

@@ -11,7 +11,9 @@ from hydroid.words import (
     listed,
     printable,
     told_apart,
+    value_and_interval,
     value_words,
+    with_minus,
 )
 
 FIELDS = Formatter().parse
@@ -63,6 +65,30 @@ def test_a_name_does_nothing_to_a_terminal(name: str):
     assert shown.startswith("a\t?")
     assert shown.endswith("\u00a0ä√\n")
     assert shown.replace("\t", "").replace("\n", "").replace("\u00a0", "").isprintable()
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "expected"),
+    [
+        (42.0, 39.0, 45.3, "42 ± 3"),
+        # the farther end counts, and two digits of a half that begins with 1
+        (36.5, 29.0, 46.6, "36 ± 10"),
+        (0.0208, 0.0203, 0.0213, "0.0208 ± 0.0005"),
+        (54.2, 24.0, 121.0, "54 (24 to 121)"),
+        (1.08, 0.58, None, "1.1 (from 0.58)"),
+        (3.0, None, None, "3 (no interval)"),
+    ],
+)
+def test_a_heading_has_a_value_with_its_interval_in_short(
+    value: float, low: float | None, high: float | None, expected: str
+) -> None:
+    assert value_and_interval(value, low, high) == expected
+
+
+def test_a_negative_number_has_a_minus_sign_and_a_name_keeps_its_hyphen():
+    said = "swing at -52 deg (-5 to -2), log-3.csv, --out x-1, a=-1"
+    assert with_minus(said) == "swing at −52 deg (−5 to −2), log-3.csv, --out x-1, a=-1"
+    assert with_minus("-.5") == "−.5"
 
 
 def test_a_long_list_ends_with_how_many_more():

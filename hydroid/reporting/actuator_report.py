@@ -30,7 +30,7 @@ from hydroid.reporting.page import Cell, Plot, Section, Table
 from hydroid.reporting.parameters_report import SIDES, direction_word
 from hydroid.reporting.stated_values import in_heading, value_and_origin, value_of
 from hydroid.settings.fit import FitSettings
-from hydroid.words import listed, two_digits
+from hydroid.words import listed, two_digits, value_and_interval
 
 OVER = 0.25
 """time over which a speed is measured [s]; for as long before it the command must have
@@ -278,11 +278,17 @@ def _fastest(name: str, speed: CurveEstimate, commands: Commands, words: Words) 
         ("negative", commands.negative),
     ):
         if largest:
-            size = abs(np.interp(largest, speed.at, speed.value))
+            # value and ends of the interval there, NaN of one without
+            rows = _rows(speed)
+            top, *ends = (float(np.interp(largest, rows[0], row)) for row in rows[1:])
+            low, high = sorted(map(abs, ends))
             word = words[towards] or towards
             # its unit stands once for a joint
-            top = two_digits(float(size)) + ("" if said else f" {speed.unit}")
-            said.append(f"{word} {top} at {largest:+.0f} %")
+            size = two_digits(abs(top))
+            if np.isfinite(ends).all():
+                size = value_and_interval(abs(top), low, high)
+            size += "" if said else f" {speed.unit}"
+            said.append(f"{word} {size} at {largest:+.0f} %")
     return f"{name} {', '.join(said)}" if said else ""
 
 
@@ -405,14 +411,18 @@ def _slower(names: Sequence[str], summary: FitSummary) -> str:
             late.append(f"{name} {in_heading(summary, latest)}")
         phases = _towards(name, "phase", summary.curves).values()
         if crossings := [*filter(None, map(phase_crossing, phases))]:
-            turned[name] = min(crossings)
+            turned[name] = min(crossings, key=_frequency)
     answers = list[str]()
     if late:
         answers.append(f"dead time [s]: {', '.join(late)}")
     if turned:
-        first = min(turned, key=turned.__getitem__)
-        answers.append(f"phase {TURNED:g}° at {turned[first].short} Hz ({first})")
+        first = min(turned, key=lambda name: turned[name].frequency)
+        answers.append(f"lag {-TURNED:g}° at {turned[first].short} Hz ({first})")
     return "; ".join(answers)
+
+
+def _frequency(crossing: Crossing) -> float:
+    return crossing.frequency
 
 
 def measured_speeds(log: Log, joint: int, delay: float) -> tuple[Array, Array]:

@@ -36,7 +36,7 @@ MOST_TRAVEL = 0.7
 """part of a joint's range that logs should cover"""
 TOGETHER = 0.1
 """part of the driven time in which several joints should move"""
-SIGNS = {1.0: "+", -1.0: "-"}
+SIGNS = (1.0, -1.0)
 HEADER = (
     "joint",
     "unit",
@@ -196,7 +196,7 @@ def _lacks_of_joints(joints: Sequence[Covered]) -> Iterator[Lack]:
     """Yield what logs lack of single joints."""
     never = [one.joint for one in joints if len(one.smallest) < len(SIGNS)]
     weak = [one.joint for one in joints if _is_weak(one)]
-    fast = [f"{one.joint} (now {_least(one)} %)" for one in joints if _is_fast(one)]
+    fast = [one.joint for one in joints if _is_fast(one)]
     lacks = (
         ("both directions", never, "The logs command one of them only."),
         ("larger commands", weak, "Beyond, speeds are extrapolated."),
@@ -265,11 +265,6 @@ def _none_below(joints: Sequence[Covered]) -> str:
     if not smallest or min(smallest) <= SMALL:
         return ""
     return f"; none below {min(smallest):.0f}"
-
-
-def _least(one: Covered) -> str:
-    signed = [f"{SIGNS[sign]}{size:.0f}" for sign, size in one.smallest.items()]
-    return listed(signed)
 
 
 def _positions(one: Covered) -> str:

@@ -19,6 +19,7 @@ from hydroid.reporting.actuator_report import (
     speed_section,
     step_section,
 )
+from hydroid.reporting.actuator_tables import RESPONSE_HEADER
 from hydroid.reporting.analysis import analysis_page
 from hydroid.reporting.chart import Chart
 from hydroid.reporting.correlation_report import (
@@ -95,7 +96,7 @@ def test_speeds_have_a_tab_for_each_joint_with_what_was_measured():
             f"{word} {0.24 * abs(end):.2g}{unit} at {sign}{abs(end):.0f} %"
             for word, sign, end, unit in (
                 ("positive", "+", ends.max(), " deg/s"),
-                ("negative", "−", ends.min(), ""),
+                ("negative", "-", ends.min(), ""),
             )
         ]
         said.append(f"{name} {', '.join(tops)}")
@@ -132,20 +133,27 @@ def test_the_valve_s_dead_bands_stand_beside_its_heading():
         }
     )
     one = SUMMARY.estimate["K"]
-    estimate = {name: one.changed({"value": value}) for name, value in bands.items()}
+    estimate = {
+        name: one.changed({"value": value, "interval": (value - 2.0, value + 2.0)})
+        for name, value in bands.items()
+    }
     summary = SUMMARY.changed({"curves": curves, "estimate": estimate})
     section = speed_section(settings, summary, PROBLEM.logs)
     assert section is not None
     assert section.title.startswith("Valve: dead band")
-    said = "dead band: shoulder +12 and −8.5 % and elbow +0 and −5 % (fixed); the model's speed"
-    assert section.answer.startswith(said)
-    stated = SUMMARY.quantities["shoulder_dead_band"].changed({"value": 15.0})
+    said = "dead band [%]: shoulder +12 ± 2 and -8.5, elbow +0 and -5 (fixed)"
+    # the logs have no command of the shoulder from 12 to 16 %
+    assert section.answer == f"{said}; extrapolated below 16"
+    stated = SUMMARY.quantities["shoulder_dead_band"].changed(
+        {"value": 15.0, "interval": (5.0, 40.0), "data_share": 0.2}
+    )
     quantities = {"shoulder_dead_band_positive": stated}
     section = speed_section(
         settings, summary.changed({"quantities": quantities}), PROBLEM.logs
     )
     assert section is not None
-    assert section.answer.startswith("dead band: shoulder +15 and −8.5 % and elbow")
+    said = "dead band [%]: shoulder +15 (5.0 to 40) (mostly prior) and -8.5, elbow"
+    assert section.answer.startswith(said)
 
 
 def test_step_and_frequency_response_stand_where_a_fit_states_them():
@@ -173,9 +181,11 @@ def test_step_and_frequency_response_stand_where_a_fit_states_them():
     assert direction_word(summary, "shoulder", "negative") == ""
     section = step_section(SETTINGS, summary)
     assert section is not None
+    # a phase of 3 to 1 deg turns no further
+    assert section.answer == "lag 90° at over 0.5 Hz (shoulder)"
     # from 3 to 3 / √2, between 0.5 and 1 Hz
-    answer = "in the slower direction: bandwidth (-3 dB): shoulder 0.9 Hz"
-    assert section.answer == answer
+    row = dict(zip(RESPONSE_HEADER, section.tables["responses"].rows[0], strict=True))
+    assert row["bandwidth (-3 dB) [Hz]"] == "0.9"
     (tab,) = section.tabs
     chart = tab.make()
     assert [(panel.log_x, panel.log_y) for panel in chart.panels] == [
@@ -203,6 +213,27 @@ def test_residuals_are_tested_of_each_joint_and_of_none_that_diverged():
     assert (
         residual_section(SETTINGS, SUMMARY.changed({"errors": {}}), predictions) is None
     )
+
+
+def test_the_residuals_heading_says_how_long_what_is_left_of_an_error_lasts():
+    """Where they are not white, of the joint whose error lasts longest."""
+    predictions = fitted(FIT)
+    slow = np.sin(0.05 * np.arange(len(predictions[0].log.time)))[:, None]
+    wrong = [replace(one, response=one.response + slow) for one in predictions]
+
+    def answer(*seconds: float) -> str:
+        lasting = {
+            name: error.changed({"lasts_s": time})
+            for (name, error), time in zip(SUMMARY.errors.items(), seconds, strict=True)
+        }
+        summary = SUMMARY.changed({"errors": lasting})
+        section = residual_section(SETTINGS, summary, wrong)
+        assert section is not None
+        return section.answer
+
+    start = "no, so intervals may be too narrow; "
+    assert answer(0.2, 1.4) == f"{start}what is left of the elbow's error lasts 1.4 s"
+    assert answer(0.0, 0.0).startswith(f"{start}autocorrelation up to ")
 
 
 def test_a_prior_and_what_the_logs_made_of_it_are_in_its_standard_deviations():

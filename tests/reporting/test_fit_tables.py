@@ -24,7 +24,8 @@ from hydroid.reporting.knowledge_report import (
 )
 from hydroid.reporting.merged_report import merged_tables
 from hydroid.reporting.page import Table, log_names
-from hydroid.reporting.parameters_report import parameter_table
+from hydroid.reporting.parameters_report import parameter_table, short_table
+from hydroid.reporting.stated_values import in_heading
 from hydroid.search.descent import Ending
 
 FEWER = {name: bounds for name, bounds in MODEL.items() if name != "M2"}
@@ -319,6 +320,24 @@ def test_a_fit_whose_time_was_up_gives_no_advice_that_holds_only_of_an_optimum(
     assert said.count("--resume") == is_up
     assert said.count("time was up") == is_up
     assert "The time for the fit was up" not in said
+
+
+def test_where_logs_disagree_intervals_by_log_stand_first_and_are_the_heading_s():
+    problem = make_problem()
+    one = summarise(problem, make_fit(problem)).changed(
+        {"left_out_deg": {"q2": (1.0, 2.0)}}
+    )
+    disagree = one.changed({"findings": (Finding("logs disagree", "warning", ("K",)),)})
+    orders = {False: ("interval", "by log"), True: ("by log", "interval")}
+    for summary, is_first in ((one, False), (disagree, True)):
+        header = short_table(problem.settings, summary).header
+        assert header[-3:-1] == orders[is_first]
+        header = parameter_table(problem.settings, summary).header
+        assert (header.index("by log from") < header.index("from")) == is_first
+    known = {"value": 40.0, "interval": (38.0, 42.0), "interval_by_log": (30.0, 50.0)}
+    wide = one.estimate["K"].changed(known)
+    assert in_heading(one, wide) == "40 ± 2"
+    assert in_heading(disagree, wide, "%") == "40 ± 10 %"
 
 
 def test_the_settings_hold_what_no_parameter_states():

@@ -252,9 +252,9 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
         "10 s": "diverged (5)",
         "whole logs": "3.0 (2.0)",  # two logs tell nothing
         "whole fitted logs": "1",
-        "good up to": "1",
+        "allowed error": "1",
     }
-    assert "Good up to: the error" in table.note
+    assert "Allowed error: over whole logs" in table.note
     # the page also says by which rule; of the verdicts that it shows alone
     section = verdict_sections({"a": [one]}, ())[0]
     note = section.tables["verdict"].note
@@ -319,17 +319,34 @@ def test_the_worst_joint_is_that_which_errs_most_for_its_tolerance():
     )
     said = worst([swing, boom])
     assert said.startswith(
-        "Furthest outside its tolerance: boom, 2.00 deg (allowed 1, "
+        "Furthest beyond its allowed error: boom, 2.00 deg (allowed 1, "
     )
-    assert said.endswith("The best simple model errs by 2.04 deg.")
+    # one log does not tell which of both errs less
+    chance = "The best simple model errs by 2.04 deg; the difference may be chance."
+    assert said.endswith(chance)
+    told = Comparison(outcome=Outcome.WORSE, blocks=4)
+    worse = boom.changed(
+        {
+            "unseen_deg": 2.5,
+            "unseen_logs": 4,
+            "compared_whole": {"nine numbers": told},
+        }
+    )
+    assert worst([swing, worse]).endswith("A simple model errs by less: 2.0 deg.")
+    untold = told.changed({"outcome": Outcome.UNTOLD})
+    unclear = worse.changed({"compared_whole": {"nine numbers": untold}})
+    assert worst([swing, unclear]).endswith("the difference may be chance.")
+    # errors on fitted logs are not compared
+    own = boom.changed({"unseen_logs": 0, "unseen_deg": None, "fitted_deg": 2.0})
+    assert "chance" not in worst([swing, own])
     assert not worst([boom])
     diverged = boom.changed({"unseen_deg": None, "fitted_deg": 0.1})
     assert (
         worst([swing, diverged])
-        == "Furthest outside its tolerance: boom, whose simulation diverges."
+        == "Furthest beyond its allowed error: boom, whose simulation diverges."
     )
     assert worst([swing, diverged.changed({"unseen_logs": 0})]).startswith(
-        "Nearest to its tolerance: swing"
+        "Nearest to its allowed error: swing"
     )
 
 

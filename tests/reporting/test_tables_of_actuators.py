@@ -11,8 +11,15 @@ from hydroid.estimate import CurveEstimate, FitSummary
 from hydroid.fitting.summary import summarise
 from hydroid.fitting.validation import Prediction, fitted
 from hydroid.prediction import OilTrace
-from hydroid.reporting.actuator_tables import bandwidth, settling_time, speed_table
+from hydroid.reporting.actuator_tables import (
+    bandwidth,
+    far_commands,
+    phase_crossing,
+    settling_time,
+    speed_table,
+)
 from hydroid.reporting.oil_report import oil_section
+from hydroid.settings.problem import ParameterSettings
 
 PROBLEM = make_problem(outputs=(2, 3), samples=200, sources=("a.csv", "b.csv"))
 FIT = make_fit(PROBLEM)
@@ -59,6 +66,36 @@ def test_a_bandwidth_is_where_the_amplitude_has_fallen_by_3_db():
     assert bandwidth(known) == pytest.approx(1.0, rel=1e-2)
     short = curve((0.01, 0.02), (1.0, 0.99), "deg/s per %")
     assert bandwidth(short) is None
+
+
+def phase_of_a_delay(delay: float, low: float, high: float) -> CurveEstimate:
+    """Return the phase of a delay [s] from 0.2 to 5 Hz, with its interval."""
+    at = np.geomspace(0.2, 5.0, 60)
+    of = [tuple((-360.0 * at * seconds).tolist()) for seconds in (delay, high, low)]
+    phase = curve(tuple(at.tolist()), of[0], "deg")
+    return phase.changed({"interval": tuple(zip(*of[1:], strict=True))})
+
+
+def test_a_quarter_of_a_turn_is_late_at_a_quarter_of_the_delay_s_frequency():
+    found = phase_crossing(phase_of_a_delay(0.25, low=0.2, high=0.5))
+    assert found is not None
+    assert found.frequency == pytest.approx(1.0, rel=1e-2)
+    assert found.interval == pytest.approx((0.5, 1.25), rel=1e-2)
+    assert found.cell == "1.00 (0.50 to 1.25)"
+    # beyond the logs' rate, or below the lowest frequency, there is none
+    early = phase_crossing(phase_of_a_delay(0.01, low=0.005, high=0.02))
+    assert early is not None
+    assert early.cell == "over 5"
+    assert phase_crossing(phase_of_a_delay(2.0, low=1.9, high=2.1)) is None
+
+
+def test_measured_medians_that_the_model_misses_by_far_are_named():
+    speed = curve((20.0, 40.0, 60.0), (1.0, 10.0, 20.0), "deg/s")
+    # a fifth off, near; a half off, far; and so slow that it does not matter
+    medians = {20.0: 0.2, 40.0: 8.0, 60.0: 10.0}
+    pairs = [(command, value) for command, value in medians.items() for _ in range(5)]
+    measured = np.array(pairs).T
+    assert far_commands(speed, measured) == [60.0]
 
 
 def after_a_step(at: np.ndarray, speed: np.ndarray, onset: float) -> FitSummary:
@@ -117,12 +154,32 @@ def test_the_largest_flow_and_the_lowest_pressure_of_the_pump_have_their_log_and
         ("pump's line", "200", "90", "a.csv", "0.1"),
     )
     assert section.answer == (
-        "the pump gives at most 150 L/min, and its line falls from 200 to 90 bar; "
-        "no log measures pressures"
+        "pump at most 150 L/min (fixed); no log measures pressures"
     )
     # what limits them, and whether the fit says so
     assert "at most 150 L/min (fixed)" in section.text
     assert "at most 150 bar (fixed), where the relief valve opens" in section.text
+
+
+def test_a_pump_that_is_mostly_the_prior_s_is_called_so_beside_its_interval():
+    first, _ = fitted(FIT)
+    parameter = {"quantity": "pump_flow", "bounds": (10.0, 500.0), "joints": None}
+    settings = PROBLEM.settings.changed({"hydraulics.pump_flow": 150.0})
+    settings = settings.with_parameters(
+        {"flow": ParameterSettings.model_validate(parameter)}
+    )
+    known = {"value": 116.0, "interval": (62.0, 217.0), "data_share": 0.18}
+    flow = SUMMARY.estimate["K"].changed(known | {"interval_by_log": (53.0, 254.0)})
+
+    def answer(**changes) -> str:
+        summary = SUMMARY.changed({"estimate": {"flow": flow.changed(changes)}})
+        section = oil_section(settings, summary, [with_oil(first, 1e-3, 90e5)], None)
+        assert section is not None
+        return section.answer.partition(";")[0]
+
+    assert answer() == "pump at most 116 (62 to 217) L/min (mostly prior)"
+    from_logs = {"data_share": 0.9, "interval": (110.0, 120.0)}
+    assert answer(**from_logs) == "pump at most 116 ± 6 L/min"
 
 
 def test_without_hydraulics_or_a_pump_nothing_is_said_of_them():

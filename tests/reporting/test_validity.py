@@ -7,7 +7,7 @@ import pytest
 from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.log import Log
-from hydroid.reporting.validity_report import covered, validity_section
+from hydroid.reporting.validity_report import covered, log_next, validity_section
 
 PROBLEM = make_problem(outputs=(2, 3), samples=400)
 RECORD = make_record(PROBLEM, make_fit(PROBLEM))
@@ -44,17 +44,19 @@ def test_commands_positions_and_speeds_are_those_of_the_logs():
 def test_what_the_logs_lack_is_what_to_log_next():
     run = record_of(log_of([50.0, 30.0], [40.0, -60.0]))
     section = validity_section(run)
-    assert "valid for free motion, shoulder 0 to +50 %" in section.answer
-    said = " ".join(section.points)
-    assert "both directions of shoulder." in said
+    reached = "commands [%] up to: shoulder 0 and +50, elbow -60 and +40; none below 30"
+    assert section.answer == f"free motion, {reached}"
+    said = " ".join(log_next(run))
+    assert "Log both directions of shoulder." in said
     # the elbow's commands have one size in each direction: its valve is on or off
-    assert "larger commands of shoulder (now 0 to +50 %)." in said
-    assert "smaller commands of shoulder (now from +30 %)." in said
-    assert "more unseen logs, 4 in all, to validate on. There are none." in said
+    assert "Log larger commands of shoulder." in said
+    assert "Log smaller commands of shoulder." in said
+    assert "Log 4 unseen logs in all, to validate on. There are none." in said
     assert "several joints at once" not in said
     assert "hydroid suggest --fit RUN" in said
     # what the model leaves out, whatever the logs cover
-    assert "Limit: oil temperature and engine speed as in the fitted logs" in said
+    limits = " ".join(section.points)
+    assert "Limit: oil temperature and engine speed as in the fitted logs" in limits
 
 
 def test_nothing_is_asked_for_that_the_logs_have():
@@ -67,6 +69,6 @@ def test_nothing_is_asked_for_that_the_logs_have():
     log = replace(log, command=command, angle=angle)
     unseen = {f"{n}": make_prediction(log, joints=(2, 3)) for n in range(4)}
     run = replace(record_of(log), validations=unseen)
-    said = " ".join(validity_section(run).points)
+    said = " ".join(log_next(run))
     for asked in ("both directions", "commands of", "poses of shoulder", "unseen"):
         assert asked not in said

@@ -133,7 +133,7 @@ class Ladder:
         tried: by how much each term of one joint foretells parts of the logs left out
             better on that joint alone, and the standard error of that (`left_out.gain`);
             None: it was not refined, as it promises too little or noise alone is left.
-            A term that was dropped later has what it gained there, of all joints.
+            A term that was dropped of all joints together has what it gained there.
     """
 
     def __init__(
@@ -328,6 +328,9 @@ class Ladder:
             new = replace(new, gained=gained)
             self.estimates[step.estimate] = new
             if not is_clear(*gained):
+                for term in step.terms:
+                    if term not in self._step.terms:
+                        self.tried[term] = gained
                 return
         self._keep(own, new, step)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from hydroid.estimate import FitSummary
+from hydroid.fitting.left_out import is_clear
 from hydroid.fitting.step import step_of
 from hydroid.quantity_table import CHOICES, HYDRAULIC, TARGETS
 from hydroid.reporting.page import Section, Table
@@ -521,7 +522,8 @@ def gain_words(gained: Gain) -> str:
     if rise is None or error is None:
         return "what it gained is not known"
     words = f"{two_digits(rise)} ± {two_digits(error)}".replace("-", "−")
-    return f"gain {words}, not clear"
+    # what is clear on a joint alone may yet not be kept beside the others
+    return f"gain {words}" if is_clear(rise, error) else f"gain {words}, not clear"
 
 
 def _answer(settings: FitSettings, effects: Sequence[Contained]) -> str:

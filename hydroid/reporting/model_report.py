@@ -325,12 +325,18 @@ def _of(settings: FitSettings, side: str, joint: int) -> _Of:
         if parameter.fixed is None:
             return _Of(joint, ESTIMATED)
         value = parameter.fixed
-    unit = CHOICES[side].unit
-    if value is None or value == 0.0 or (value == 1.0 and not unit):
+    if _does_nothing(side, value):
         return _Of(joint, OFF)
     # what the arm's file says differs from joint to joint
     known = value if side in HYDRAULIC or _setting(settings, side) else None
     return _Of(joint, HELD, known)  # pyright: ignore[reportArgumentType]
+
+
+def _does_nothing(side: str, value: object) -> bool:
+    """Return whether a value of a quantity leaves its effect out: none, zero, or a factor
+    of 1."""
+    is_factor = not CHOICES[side].unit
+    return value is None or value == 0.0 or (is_factor and value == 1.0)
 
 
 def _setting(settings: FitSettings, side: str) -> list[ParameterSettings]:
@@ -358,14 +364,20 @@ def _ways(
         if not everywhere or len(there) < len(places):
             words += f": {listed([settings.arm.name_of(one.joint) for one in there])}"
         yield words
+    changes = _changes(settings, effect)
+    if changes:
+        yield f"differs between groups of logs: {listed(changes, 3)}"
+
+
+def _changes(settings: FitSettings, effect: Effect) -> list[str]:
+    """Return the names of parameters by which an effect differs between groups of
+    logs."""
     sides = _sides(effect).keys()
-    changes = [
+    return [
         name
         for name, parameter in settings.parameters.items()
         if parameter.per and not sides.isdisjoint(TARGETS[parameter.quantity])
     ]
-    if changes:
-        yield f"differs between groups of logs: {listed(changes, 3)}"
 
 
 def _sides(effect: Effect) -> dict[str, None]:
@@ -481,20 +493,18 @@ def _dropped(run: FinishedRun) -> list[_Trial]:
     """Return the trials of the terms that the final model does not have."""
     begun = run.begun or run.settings
     kept = step_of(run.summary.final or "").terms
-    trials = list[_Trial]()
-    for term in begun.terms():
-        if term in kept:
-            continue
-        own = [one for one in begun.parameters.values() if one.term == term]
-        joints = {joint for one in own for joint in one.joints or ()}
-        trials.append(
-            _Trial(
-                sides=frozenset(side for one in own for side in TARGETS[one.quantity]),
-                joint=[begun.arm.name_of(*joints)] if len(joints) == 1 else [],
-                gained=_trial_words(run.summary, term),
-            )
-        )
-    return trials
+    return [_trial(run, begun, term) for term in begun.terms() if term not in kept]
+
+
+def _trial(run: FinishedRun, begun: FitSettings, term: str) -> _Trial:
+    """Return the trial of a term of the settings that a fit has begun with."""
+    own = [one for one in begun.parameters.values() if one.term == term]
+    joints = {joint for one in own for joint in one.joints or ()}
+    return _Trial(
+        sides=frozenset(side for one in own for side in TARGETS[one.quantity]),
+        joint=[begun.arm.name_of(*joints)] if len(joints) == 1 else [],
+        gained=_trial_words(run.summary, term),
+    )
 
 
 def _trial_words(summary: FitSummary, term: str) -> str:

@@ -78,6 +78,7 @@ def _use(prediction: Prediction) -> str:
 
 def _joints(settings: FitSettings, logs: Sequence[Log]) -> list[int]:
     """Return the joints, from 1, that are compared or that any log drives."""
+    # a joint that no angle of is compared still takes oil from the pump
     driven = np.any([log.driven for log in logs], axis=0)
     also = (1 + np.flatnonzero(driven)).tolist()
     return sorted({*settings.outputs, *also})
@@ -89,6 +90,7 @@ def _log_table(
     """Return the table of logs, one row each."""
     names = log_names(log.source for log in logs)
     columns = ["log", "use", "length [s]", "samples"]
+    # runs of before did not store what the files held
     has_rates = any(log.rows for log in logs)
     if has_rates:
         columns.append("rate [Hz]")
@@ -131,6 +133,7 @@ def _rate(log: Log) -> str:
     if log.rows is None:
         return ""
     shortest, usual, longest = log.rows.steps
+    # a clock that errs by so little has no range that anybody asks for
     rate = three_digits(1.0 / usual)
     if max(longest - usual, usual - shortest) <= EVEN * usual:
         return f"{rate}, even"
@@ -185,7 +188,9 @@ def driven_together(settings: FitSettings, logs: Sequence[Log]) -> Together:
     columns = [joint - 1 for joint in settings.outputs]
     seconds = np.zeros(3)
     for log in logs:
+        # what a lever gives at rest is no command
         counts = np.sum(np.abs(log.command[:, columns]) >= LEAST_COMMAND, axis=1)
+        # two joints or ten: each may slow the others
         of_log = np.bincount(counts.clip(max=2), minlength=3)
         seconds += log.period * of_log
     none, one, several = (seconds / seconds.sum()).tolist()

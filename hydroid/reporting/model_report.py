@@ -235,6 +235,7 @@ def contained(run: FinishedRun) -> list[Contained]:
         for effect in EFFECTS
         if _is_of(settings, effect)
     ]
+    # stage 1 has one gain in place of twenty effects: one row says so
     if settings.stage == "mech":
         stated = [*_without_hydraulics(stated)]
     general = [*_motion(run), *_coupling(settings, stated)]
@@ -305,6 +306,7 @@ def _best(settings: FitSettings, effect: Effect, joint: int) -> _Of:
         for side in TARGETS[quantity]
         if not joint or settings.arm.joint(joint).has(quantity)
     ]
+    # one side that is estimated is enough: the effect is in the model
     for state in (ESTIMATED, HELD):
         for one in of_joint:
             if one.state == state:
@@ -316,6 +318,7 @@ def _of(settings: FitSettings, side: str, joint: int) -> _Of:
     """Return what a fit has of a quantity, or one of its two sides, at a joint."""
     if side in settings.rung.lacks:
         return _Of(joint, OFF)
+    # a parameter goes before the settings, and these before what is usual
     value = CHOICES[side].default
     if side in HYDRAULIC:
         value = getattr(settings.hydraulics, side)
@@ -353,6 +356,7 @@ def _ways(
     settings: FitSettings, effect: Effect, places: Sequence[_Of]
 ) -> Iterator[str]:
     """Yield at which joints an effect is estimated, held at which value, or off."""
+    # the pump is no joint's, so no joint needs a name
     everywhere = len(places) == len(settings.outputs) or not places[0].joint
     for state in (ESTIMATED, HELD, OFF):
         there = [place for place in places if place.state == state]
@@ -388,6 +392,7 @@ def _sides(effect: Effect) -> dict[str, None]:
 def _value(effect: Effect, places: Sequence[_Of]) -> str:
     """Write the value at which an effect of a single quantity is held; nothing where it
     has several."""
+    # joints that differ have their values in the table of parameters
     value = places[0].value
     is_shared = all(place.value == value for place in places)
     if value is None or not is_shared or effect.decides[1:]:
@@ -491,6 +496,7 @@ def _coupling(
 
 def _dropped(run: FinishedRun) -> list[_Trial]:
     """Return the trials of the terms that the final model does not have."""
+    # the settings of the final model no longer have the terms that it dropped
     begun = run.begun or run.settings
     kept = step_of(run.summary.final or "").terms
     return [_trial(run, begun, term) for term in begun.terms() if term not in kept]

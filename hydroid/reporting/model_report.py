@@ -72,7 +72,7 @@ OIL = Effect(
     instead="the oil is stiff, so no joint rings on it",
 )
 PUMP = Effect(
-    "pump that saturates (largest flow)",
+    "limit of the pump's flow (saturation)",
     ("pump_flow",),
     instead="the pump gives any flow",
 )
@@ -559,7 +559,10 @@ def _answer(settings: FitSettings, effects: Sequence[Contained]) -> str:
     if settings.stage == "mech":
         answers.append("hydraulics: one gain")
     else:
-        answers += [f"compressible oil: {said(OIL)}", f"pump saturates: {said(PUMP)}"]
+        answers += [
+            f"compressible oil: {said(OIL)}",
+            f"limit of the pump's flow: {said(PUMP)}",
+        ]
     if SHARED in by_name:
         state = by_name[SHARED].state
         answers.append(f"joints share the pump: {'yes' if state == IN else 'no'}")

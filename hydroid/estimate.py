@@ -241,8 +241,9 @@ class FitSummary(Settings):
     estimates: dict[str, NamedEstimate] = {}
     """by name; the first is the search's own"""
     tried: dict[str, tuple[float | None, float | None] | None] = {}
-    """what each term of a single joint gained, as `gained` of an estimate, on that joint
-    alone; null: it was not refined, as it promised too little or noise alone was left"""
+    """what terms gained, as `gained` of an estimate: of a single joint on that joint
+    alone, or where it was dropped of all joints together; null: it was not refined, as
+    it promised too little or noise alone was left"""
     quantities: dict[str, QuantityEstimate] = {}
     """what follows from the final estimate, by name"""
     curves: dict[str, CurveEstimate] = {}

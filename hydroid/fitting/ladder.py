@@ -133,7 +133,7 @@ class Ladder:
         tried: by how much each term of one joint foretells parts of the logs left out
             better on that joint alone, and the standard error of that (`left_out.gain`);
             None: it was not refined, as it promises too little or noise alone is left.
-            A term that was dropped later has what it gained there, of all joints.
+            A term that was dropped of all joints together has what it gained there.
     """
 
     def __init__(
@@ -150,6 +150,7 @@ class Ladder:
         self.kept = min(estimates.values(), key=lambda e: e.rms if e.usable else np.inf)
         self._watch = watch
         self._checkpoints = checkpoints
+        self._dropped = set[str]()
         self._late = False
         self._begun_anew: Step | None = None
         self._step = step_of(self.kept.name)
@@ -328,6 +329,9 @@ class Ladder:
             new = replace(new, gained=gained)
             self.estimates[step.estimate] = new
             if not is_clear(*gained):
+                for term in step.terms:
+                    if term not in self._step.terms:
+                        self._note_dropped(term, gained)
                 return
         self._keep(own, new, step)
 
@@ -444,7 +448,7 @@ class Ladder:
             own = whole.varied(whole.settings.of_estimate(tried.estimate))
             if not self._promises(own, problem, theta, joint):
                 if not self._late:
-                    self.tried[term] = None
+                    self._note_alone(term, None)
                 continue
             among = len(lone)
             alone_with = self._alone(problem, own, theta, tried, settings, among)
@@ -510,13 +514,13 @@ class Ladder:
         if self._late:
             return _Alone()
         term = step.terms[-1]
-        self.tried[term] = None
+        self._note_alone(term, None)
         with_it = min(ends, key=lambda end: end.negative_log, default=None)
         if with_it is not None:
             gained = gain(
                 self._left_out_of(after, with_it), self._left_out_of(before, without)
             )
-            self.tried[term] = gained
+            self._note_alone(term, gained)
             if is_clear(*gained, among):
                 return _Alone(theta=after.parameters.from_unit(with_it.point))
         return _Alone(without=before.parameters.from_unit(without.point))
@@ -578,8 +582,19 @@ class Ladder:
         without = self._left_out_of(own, result)
         gained = gain(with_it, without)
         if not self._late and not is_clear(*gained):
-            self.tried[term] = gained
+            self._note_dropped(term, gained)
             self._keep(own, self._measured(own, result, step), step)
+
+    def _note_alone(self, term: str, gained: tuple[float, float] | None) -> None:
+        """Note what a term gained on its joint alone, unless all joints together have
+        decided on it."""
+        if term not in self._dropped:
+            self.tried[term] = gained
+
+    def _note_dropped(self, term: str, gained: tuple[float, float]) -> None:
+        """Note what a term gained of all joints together, which do not keep it."""
+        self._dropped.add(term)
+        self.tried[term] = gained
 
     def _is_at_end(self) -> bool:
         """Return whether there is no time left, or nothing but noise to explain."""

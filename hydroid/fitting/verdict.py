@@ -16,7 +16,8 @@ verdict:
 - predicts no better than a simple model: the fit is not ahead of that one, and at one
   of these times it is worse; the simplest such model is named;
 - predicts worse than it fits: the error on the unseen logs is more than twice that on
-  the fitted ones, or the simulation diverges;
+  the fitted ones and the fit is not ahead of each simple model, or the simulation
+  diverges;
 - predicts little: the error on the unseen logs is more than half of what standing still
   errs by there;
 - cannot be told from a simple model: the fit is not ahead of that one, and at none of
@@ -326,7 +327,10 @@ def _rough_verdict(
     Errors are the fit's, and those of simple models on unseen logs; `not_ahead` are the
     simple models that the fit cannot be told from.
     """
-    if fitted is not None and _is_beyond(unseen, WORSE * fitted):
+    # one that is ahead of all simple models is of use, however well it fits its own logs
+    ahead_of_all = not not_ahead and np.isfinite(unseen)
+    is_worse = fitted is not None and _is_beyond(unseen, WORSE * fitted)
+    if is_worse and not ahead_of_all:
         return Verdict.WORSE_THAN_FITTED, None
     if _is_beyond(unseen, LITTLE * simple[NAMES[0]]):
         return Verdict.LITTLE, None

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.arrays import record
+from hydroid.arrays import Array, record
 from hydroid.fitting.validation import Prediction
 from hydroid.log import Log
 from hydroid.log.command_sizes import HELD, largest_commands
@@ -24,6 +24,10 @@ NO_BREAK = "\u00a0"
 """blank at which no line ends"""
 EVEN = 0.02
 """part of the usual step by which others may differ from it and are even"""
+MOVES = 0.02
+"""part of its travel that a joint covers in a second at least while it moves"""
+HALF_WINDOW = 0.1
+"""to each side of a moment, over which its speed counts [s]"""
 STANDS = 0.2
 """motion of a joint up to which it stands [deg, mm]"""
 MOSTLY = 5.0
@@ -45,7 +49,7 @@ _NOT_STORED = (
 
 @record
 class Together:
-    """Parts of the time of logs in which so many joints are driven at once."""
+    """Parts of the time of logs in which so many joints move at once."""
 
     none: float
     one: float
@@ -78,6 +82,7 @@ def _use(prediction: Prediction) -> str:
 
 def _joints(settings: FitSettings, logs: Sequence[Log]) -> list[int]:
     """Return the joints, from 1, that are compared or that any log drives."""
+    # a joint that no angle of is compared still takes oil from the pump
     driven = np.any([log.driven for log in logs], axis=0)
     also = (1 + np.flatnonzero(driven)).tolist()
     return sorted({*settings.outputs, *also})
@@ -89,6 +94,7 @@ def _log_table(
     """Return the table of logs, one row each."""
     names = log_names(log.source for log in logs)
     columns = ["log", "use", "length [s]", "samples"]
+    # runs of before did not store what the files held
     has_rates = any(log.rows for log in logs)
     if has_rates:
         columns.append("rate [Hz]")
@@ -131,6 +137,7 @@ def _rate(log: Log) -> str:
     if log.rows is None:
         return ""
     shortest, usual, longest = log.rows.steps
+    # a clock that errs by so little has no range that anybody asks for
     rate = three_digits(1.0 / usual)
     if max(longest - usual, usual - shortest) <= EVEN * usual:
         return f"{rate}, even"
@@ -163,9 +170,9 @@ def _points(
 ) -> Iterator[str]:
     """Yield what the table does not show."""
     if len(settings.outputs) > 1:
-        shares = driven_together(settings, fitted)
+        shares = moving_together(settings, fitted)
         said = (
-            "Joints together: in the fitted logs, two or more joints are driven at once in "
+            "Joints together: in the fitted logs, two or more joints move at once in "
             f"{_part(shares.several)} of the time"
         )
         for share, what in ((shares.one, "one alone"), (shares.none, "none")):
@@ -179,17 +186,37 @@ def _points(
     yield from _conditions(settings, logs)
 
 
-def driven_together(settings: FitSettings, logs: Sequence[Log]) -> Together:
+def moving_together(settings: FitSettings, logs: Sequence[Log]) -> Together:
     """Return in which parts of the time of logs no, one and several of the compared
-    joints get a command."""
-    columns = [joint - 1 for joint in settings.outputs]
+    joints move.
+
+    A command is no sign of it: a controller gives some inside the dead bands, too.
+    """
+    travel = dict[int, float]()
+    for joint in settings.outputs:
+        angles = [log.angle_of(joint) for log in logs if log.measures(joint)]
+        travel[joint] = max((float(np.ptp(angle)) for angle in angles), default=0.0)
     seconds = np.zeros(3)
     for log in logs:
-        counts = np.sum(np.abs(log.command[:, columns]) >= LEAST_COMMAND, axis=1)
+        counts = np.zeros(len(log.time), dtype=np.int64)
+        for joint in settings.outputs:
+            if log.measures(joint):
+                counts += _speeds(log, joint) > MOVES * travel[joint]
+        # two joints or ten: each may slow the others
         of_log = np.bincount(counts.clip(max=2), minlength=3)
         seconds += log.period * of_log
     none, one, several = (seconds / seconds.sum()).tolist()
     return Together(none, one, several)
+
+
+def _speeds(log: Log, joint: int) -> Array:
+    """Speed of a joint (number, from 1) without its sign, shape (T,) [rad/s, m/s]."""
+    angle = log.angle_of(joint)
+    half = max(round(HALF_WINDOW / log.period), 1)
+    at = np.arange(len(angle))
+    before = np.maximum(at - half, 0)
+    after = np.minimum(at + half, len(angle) - 1)
+    return np.abs(angle[after] - angle[before]) / ((after - before) * log.period)
 
 
 def _part(share: float) -> str:
@@ -263,8 +290,8 @@ def _answer(settings: FitSettings, fitted: Sequence[Log], unseen: Sequence[Log])
     """Say how much data there is, and how often joints move together."""
     said = f"{_counted(fitted)} fitted, {_counted(unseen)} unseen"
     if len(settings.outputs) > 1:
-        several = driven_together(settings, fitted).several
-        said += f"; two or more joints driven in {_part(several)} of the time"
+        several = moving_together(settings, fitted).several
+        said += f"; two or more joints move at once in {_part(several)} of the time"
     if any(log.rows and log.rows.left_out for log in (*fitted, *unseen)):
         said += "; some rows left out"
     return said

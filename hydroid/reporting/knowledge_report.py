@@ -46,8 +46,9 @@ _SURE = (
 _ERRORS = (
     "Expected: rms error of how far a joint moves in this time, if parameters and model were "
     "exact. It contains the sensor's noise, at the start and at the end of this time, and the other "
-    "influences that the fitted logs show at the joint's mean speed. An error that persists comes "
-    "from the model, not from the sensor. Empty: none persists."
+    "influences that the fitted logs show at the joint's mean speed. A new error is what the past of a log "
+    "does not foretell: the angle drifts by it and stays off. One that persists comes from the "
+    "model, not from the sensor. Empty: none persists."
 )
 _MEASURED_ERRORS = (
     " Measured: the same on the unseen logs, as in the table of verdicts. It is larger "
@@ -288,6 +289,6 @@ def _error_row(
         "sensor's noise": factor * error.sensor_deg,
         EXPECTED: factor * error.change_deg(AHEAD),
         MEASURED: None if measured is None else factor * measured,
-        "error persists for [s]": error.lasts_s or None,
+        "a new error persists for [s]": error.lasts_s or None,
         INSIDE: inside,
     }

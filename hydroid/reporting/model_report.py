@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from hydroid.estimate import FitSummary
+from hydroid.fitting.left_out import is_clear
 from hydroid.fitting.step import step_of
 from hydroid.quantity_table import CHOICES, HYDRAULIC, TARGETS
 from hydroid.reporting.page import Section, Table
@@ -71,7 +72,7 @@ OIL = Effect(
     instead="the oil is stiff, so no joint rings on it",
 )
 PUMP = Effect(
-    "pump that saturates (largest flow)",
+    "limit of the pump's flow (saturation)",
     ("pump_flow",),
     instead="the pump gives any flow",
 )
@@ -234,6 +235,7 @@ def contained(run: FinishedRun) -> list[Contained]:
         for effect in EFFECTS
         if _is_of(settings, effect)
     ]
+    # stage 1 has one gain in place of twenty effects: one row says so
     if settings.stage == "mech":
         stated = [*_without_hydraulics(stated)]
     general = [*_motion(run), *_coupling(settings, stated)]
@@ -304,6 +306,7 @@ def _best(settings: FitSettings, effect: Effect, joint: int) -> _Of:
         for side in TARGETS[quantity]
         if not joint or settings.arm.joint(joint).has(quantity)
     ]
+    # one side that is estimated is enough: the effect is in the model
     for state in (ESTIMATED, HELD):
         for one in of_joint:
             if one.state == state:
@@ -315,6 +318,7 @@ def _of(settings: FitSettings, side: str, joint: int) -> _Of:
     """Return what a fit has of a quantity, or one of its two sides, at a joint."""
     if side in settings.rung.lacks:
         return _Of(joint, OFF)
+    # a parameter goes before the settings, and these before what is usual
     value = CHOICES[side].default
     if side in HYDRAULIC:
         value = getattr(settings.hydraulics, side)
@@ -324,12 +328,18 @@ def _of(settings: FitSettings, side: str, joint: int) -> _Of:
         if parameter.fixed is None:
             return _Of(joint, ESTIMATED)
         value = parameter.fixed
-    unit = CHOICES[side].unit
-    if value is None or value == 0.0 or (value == 1.0 and not unit):
+    if _does_nothing(side, value):
         return _Of(joint, OFF)
     # what the arm's file says differs from joint to joint
     known = value if side in HYDRAULIC or _setting(settings, side) else None
     return _Of(joint, HELD, known)  # pyright: ignore[reportArgumentType]
+
+
+def _does_nothing(side: str, value: object) -> bool:
+    """Return whether a value of a quantity leaves its effect out: none, zero, or a factor
+    of 1."""
+    is_factor = not CHOICES[side].unit
+    return value is None or value == 0.0 or (is_factor and value == 1.0)
 
 
 def _setting(settings: FitSettings, side: str) -> list[ParameterSettings]:
@@ -346,6 +356,7 @@ def _ways(
     settings: FitSettings, effect: Effect, places: Sequence[_Of]
 ) -> Iterator[str]:
     """Yield at which joints an effect is estimated, held at which value, or off."""
+    # the pump is no joint's, so no joint needs a name
     everywhere = len(places) == len(settings.outputs) or not places[0].joint
     for state in (ESTIMATED, HELD, OFF):
         there = [place for place in places if place.state == state]
@@ -357,14 +368,20 @@ def _ways(
         if not everywhere or len(there) < len(places):
             words += f": {listed([settings.arm.name_of(one.joint) for one in there])}"
         yield words
+    changes = _changes(settings, effect)
+    if changes:
+        yield f"differs between groups of logs: {listed(changes, 3)}"
+
+
+def _changes(settings: FitSettings, effect: Effect) -> list[str]:
+    """Return the names of parameters by which an effect differs between groups of
+    logs."""
     sides = _sides(effect).keys()
-    changes = [
+    return [
         name
         for name, parameter in settings.parameters.items()
         if parameter.per and not sides.isdisjoint(TARGETS[parameter.quantity])
     ]
-    if changes:
-        yield f"differs between groups of logs: {listed(changes, 3)}"
 
 
 def _sides(effect: Effect) -> dict[str, None]:
@@ -375,6 +392,7 @@ def _sides(effect: Effect) -> dict[str, None]:
 def _value(effect: Effect, places: Sequence[_Of]) -> str:
     """Write the value at which an effect of a single quantity is held; nothing where it
     has several."""
+    # joints that differ have their values in the table of parameters
     value = places[0].value
     is_shared = all(place.value == value for place in places)
     if value is None or not is_shared or effect.decides[1:]:
@@ -478,22 +496,21 @@ def _coupling(
 
 def _dropped(run: FinishedRun) -> list[_Trial]:
     """Return the trials of the terms that the final model does not have."""
+    # the settings of the final model no longer have the terms that it dropped
     begun = run.begun or run.settings
     kept = step_of(run.summary.final or "").terms
-    trials = list[_Trial]()
-    for term in begun.terms():
-        if term in kept:
-            continue
-        own = [one for one in begun.parameters.values() if one.term == term]
-        joints = {joint for one in own for joint in one.joints or ()}
-        trials.append(
-            _Trial(
-                sides=frozenset(side for one in own for side in TARGETS[one.quantity]),
-                joint=[begun.arm.name_of(*joints)] if len(joints) == 1 else [],
-                gained=_trial_words(run.summary, term),
-            )
-        )
-    return trials
+    return [_trial(run, begun, term) for term in begun.terms() if term not in kept]
+
+
+def _trial(run: FinishedRun, begun: FitSettings, term: str) -> _Trial:
+    """Return the trial of a term of the settings that a fit has begun with."""
+    own = [one for one in begun.parameters.values() if one.term == term]
+    joints = {joint for one in own for joint in one.joints or ()}
+    return _Trial(
+        sides=frozenset(side for one in own for side in TARGETS[one.quantity]),
+        joint=[begun.arm.name_of(*joints)] if len(joints) == 1 else [],
+        gained=_trial_words(run.summary, term),
+    )
 
 
 def _trial_words(summary: FitSummary, term: str) -> str:
@@ -521,7 +538,8 @@ def gain_words(gained: Gain) -> str:
     if rise is None or error is None:
         return "what it gained is not known"
     words = f"{two_digits(rise)} ± {two_digits(error)}".replace("-", "−")
-    return f"gain {words}, not clear"
+    # what is clear on a joint alone may yet not be kept beside the others
+    return f"gain {words}" if is_clear(rise, error) else f"gain {words}, not clear"
 
 
 def _answer(settings: FitSettings, effects: Sequence[Contained]) -> str:
@@ -541,7 +559,10 @@ def _answer(settings: FitSettings, effects: Sequence[Contained]) -> str:
     if settings.stage == "mech":
         answers.append("hydraulics: one gain")
     else:
-        answers += [f"compressible oil: {said(OIL)}", f"pump saturates: {said(PUMP)}"]
+        answers += [
+            f"compressible oil: {said(OIL)}",
+            f"limit of the pump's flow: {said(PUMP)}",
+        ]
     if SHARED in by_name:
         state = by_name[SHARED].state
         answers.append(f"joints share the pump: {'yes' if state == IN else 'no'}")

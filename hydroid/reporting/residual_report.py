@@ -19,6 +19,8 @@ from hydroid.reporting.page import Cell, Plot, Section, Table
 from hydroid.settings.fit import FitSettings
 from hydroid.words import two_digits
 
+NOTABLE = 0.5
+"""for how long a new error lasts that a heading states [s]"""
 _TEXT = (
     "The 95 % confidence intervals hold only if the model is right. This test can show that it is "
     "not. It takes the innovations: the part of each sample that earlier samples do not predict. "
@@ -93,10 +95,10 @@ def _answer(
 
 def _lasting(settings: FitSettings, summary: FitSummary) -> str:
     """Say of the joint whose error lasts longest how long what is left of it does; nothing
-    where none lasts longer than the error model says."""
+    where that is over within NOTABLE: a reader would take the drift for quick noise."""
     times = {joint: summary.errors[f"q{joint}"].lasts_s for joint in settings.outputs}
     joint = max(times, key=times.__getitem__)
-    if not times[joint]:
+    if times[joint] < NOTABLE:
         return ""
     name = settings.arm.name_of(joint)
     return f"what is left of the {name}'s error lasts {two_digits(times[joint])} s"

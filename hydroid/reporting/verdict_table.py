@@ -43,7 +43,7 @@ _RULES = {
     Verdict.PREDICTS: "within the allowed error over whole logs",
     Verdict.MISFIT: "errs on the fitted logs by more than is allowed, and more than a simple model",
     Verdict.NO_BETTER: "after 1, 5 or 10 s worse than this simple model, and never better",
-    Verdict.WORSE_THAN_FITTED: "over whole logs, errs more than twice as much on unseen as on fitted ones",
+    Verdict.WORSE_THAN_FITTED: "no better than a simple model, and twice the error of the fitted logs",
     Verdict.LITTLE: "errs by more than half of what standing still does",
     Verdict.UNTOLD: "after 1, 5 and 10 s neither better nor worse than this simple model",
     Verdict.ROUGHLY: "no other rule holds, and after 1, 5 or 10 s it is better than each simple model",

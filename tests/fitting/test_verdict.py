@@ -100,9 +100,14 @@ ROWS = {
     "as bad as the user allows": ((2.5, 4.5), {"tolerance": 5}, "predicts"),
     "worse than the user allows": ((0.4, 0.7), {"tolerance": 0.5}, "predicts roughly"),
     "much worse than on its own logs": (
+        (1.0, 4.9),
+        {"kind": "other"},
+        "predicts 4.9 times worse than it fits",
+    ),
+    "much worse than on its own logs, better than anything": (
         (1.0, 4.4),
         {},
-        "predicts 4.4 times worse than it fits",
+        "predicts roughly",
     ),
     "most of the motion is missed": (
         (12.0, 12.0),

@@ -9,7 +9,7 @@ from report_fits import make_fit, make_prediction, make_problem, make_record
 
 from hydroid.fitting.validation import Prediction
 from hydroid.log import FileRows, Log
-from hydroid.reporting.data_report import NO_BREAK, data_section, driven_together
+from hydroid.reporting.data_report import NO_BREAK, data_section, moving_together
 from hydroid.reporting.page import Table
 from hydroid.run.record import FinishedRun
 from hydroid.settings.log import EngineSpeed
@@ -81,15 +81,22 @@ def test_what_was_left_out_is_said_once_for_a_file_with_its_reason():
     assert "some rows left out" in section.answer
 
 
-def test_joints_are_together_for_the_time_in_which_two_get_a_command():
+def test_joints_are_together_for_the_time_in_which_two_move():
     log = log_of([50.0, 50.0, 0.0, 0.0], [60.0, 0.0, 0.0, 60.0])
-    shares = driven_together(PROBLEM.settings, [log])
-    assert (shares.several, shares.one, shares.none) == pytest.approx((0.25, 0.5, 0.25))
+    shares = moving_together(PROBLEM.settings, [log])
+    # a joint counts for a tenth of a second before it starts, and after it stops
+    expected = (0.275, 0.525, 0.2)
+    assert (shares.several, shares.one, shares.none) == pytest.approx(
+        expected, abs=0.01
+    )
     said = " ".join(data_section(run_of(log)).points)
-    assert "driven at once in 25 % of the time, one alone in 50 %, none in 25 %" in said
+    assert "move at once in 28 % of the time, one alone in 52 %, none in 20 %" in said
     always = log_of([50.0], [60.0])
     said = " ".join(data_section(run_of(always)).points)
-    assert "driven at once in all of the time." in said
+    assert "move at once in all of the time." in said
+    # a command that moves nothing
+    held = replace(always, angle=log_of([50.0], [0.0]).angle)
+    assert moving_together(PROBLEM.settings, [held]).several == 0.0
 
 
 def test_the_commands_that_no_log_has_are_named():

@@ -17,10 +17,7 @@ from hydroid.units import UNITS
 
 KINDS: tuple[Kind, ...] = ("command", "angle", "pressure")
 PERIOD = 0.02
-"""at which `init` looks at quick logs [s]"""
-SHORTEST_PERIOD = 0.03
-"""of a simulation [s]: what faster logs show besides is not seen on such machines, and
-a fit takes half the time or less"""
+"""at which `init` looks at quick logs, and of their simulation [s]"""
 LONGEST_PERIOD = 0.07
 """of a simulation [s]: a joint's lever changes in a step"""
 
@@ -112,13 +109,15 @@ def _period(period: float) -> float:
 
 
 def simulation_period(table: Table, settings: LogSettings) -> float:
-    """Return the period of a simulation of a log [s]: that of 1, 2, 4 ... samples, or a
-    half, a quarter ... of it."""
-    period = _sample_time(table, settings)
+    """Return the period of a simulation of a log [s]: its own, of a quick log PERIOD, of
+    a slow one a half, a quarter ... of its own.
+
+    A command that a valve holds for a sample is exact at the log's own period. A longer
+    one would average commands that a dead band tells apart.
+    """
+    period = max(_sample_time(table, settings), PERIOD)
     while period >= LONGEST_PERIOD:
         period = period / 2
-    while period < SHORTEST_PERIOD:
-        period = 2 * period
     return period
 
 

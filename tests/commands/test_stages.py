@@ -433,7 +433,7 @@ def test_a_compared_joint_that_no_log_drives_is_not_tested(short: Path, caplog):
         "not tested",
         None,
     )
-    assert any(f"tolerance: {shoulder.name}," in str(line) for line in fitted.lines)
+    assert any(f"allowed error: {shoulder.name}," in str(line) for line in fitted.lines)
 
 
 def test_stage_two_holds_masses_and_says_which_stage_1_moved_without_knowing_it(

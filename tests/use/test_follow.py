@@ -265,7 +265,10 @@ def test_what_may_lead_the_machine_off_its_path_is_said_first():
     found = hydroid.follow(path(one, seconds=3.0), fit=one)
     stopped, unproven = map(str, found.lines[1:3])
     assert stopped.startswith("The time for the fit was up before it had converged.")
-    assert "shoulder (predicts worse than it fits) and elbow (not tested)." in unproven
+    judgement = (
+        "shoulder (predicts 20 times worse than it fits) and elbow (not tested)."
+    )
+    assert judgement in unproven
     kinds = [finding["kind"] for finding in found.plain()["findings"]]
     assert kinds == ["time up", "path not proven"]
     proven = fitted_model(judged(2, "shoulder", Verdict.PREDICTS, 0.5))

@@ -137,6 +137,7 @@ def test_a_curve_and_a_pump_do_not_stand_in_for_each_other(name):
     # what the term of a joint gained there is known, whether it was kept or not
     gained = found.tried["curve_shoulder"]
     if name == "refined+curve_shoulder":
+        assert gained is not None
         assert is_clear(*gained, among=1)
     else:
         assert gained is None or not is_clear(*gained)

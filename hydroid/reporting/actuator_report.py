@@ -91,7 +91,9 @@ _SPEED_ALONE = (
 _STEP = (
     "How fast and how late the joint follows its command, from rest at mid travel: its speed "
     "after a step, above 0 in the direction of the command, and the frequency response "
-    "computed from it. Bands: 95 % intervals. A curve ends where the logs do not determine it. "
+    "computed from it. Its amplitude is the speed over the whole command of the step, dead band "
+    "included: small changes beyond the dead band act more strongly (gain in “All quantities”). "
+    "Bands: 95 % intervals. A curve ends where the logs do not determine it. "
     "Frequencies go up to a quarter of the logs' rate, {rate:g} Hz."
 )
 _NO_SPRING = " This model has no spring of oil: it states no natural frequency."

@@ -116,6 +116,7 @@ def simulation_period(table: Table, settings: LogSettings) -> float:
     one would average commands that a dead band tells apart.
     """
     period = max(_sample_time(table, settings), PERIOD)
+    # so that each sample is still one of the steps
     while period >= LONGEST_PERIOD:
         period = period / 2
     return period

@@ -151,6 +151,7 @@ def _motion(settings: FitSettings, log: Log, joint: int) -> str:
     if log.measures(joint):
         travel = shown.factor * float(np.ptp(log.angle_of(joint)))
         moved = two_digits(travel)
+        # that nobody drives it either goes without saying
         if travel < STANDS and not log.drives(joint):
             return "stands"
     if not log.drives(joint):
@@ -214,6 +215,7 @@ def _speeds(log: Log, joint: int) -> Array:
     angle = log.angle_of(joint)
     half = max(round(HALF_WINDOW / log.period), 1)
     at = np.arange(len(angle))
+    # at the ends of a log the window is shorter
     before = np.maximum(at - half, 0)
     after = np.minimum(at + half, len(angle) - 1)
     return np.abs(angle[after] - angle[before]) / ((after - before) * log.period)

@@ -245,6 +245,7 @@ def contained(run: FinishedRun) -> list[Contained]:
 
 def _is_of(settings: FitSettings, effect: Effect) -> bool:
     """Return whether an effect can be in a fit of this stage, and these joints."""
+    # the gain is all that stage 1 has of the hydraulics, and stage 2 has none
     if effect.decides == ("gain",):
         return settings.stage == "mech"
     every = settings.outputs

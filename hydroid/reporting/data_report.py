@@ -163,7 +163,7 @@ def _motion(settings: FitSettings, log: Log, joint: int) -> str:
 
 
 def _signed(value: float) -> str:
-    return f"{value:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0")
+    return f"{value:+.0f}".replace("+0", "0").replace("-0", "0")
 
 
 def _points(

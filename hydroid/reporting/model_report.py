@@ -538,7 +538,7 @@ def gain_words(gained: Gain) -> str:
     rise, error = gained or (None, None)
     if rise is None or error is None:
         return "what it gained is not known"
-    words = f"{two_digits(rise)} ± {two_digits(error)}".replace("-", "−")
+    words = f"{two_digits(rise)} ± {two_digits(error)}"
     # what is clear on a joint alone may yet not be kept beside the others
     return f"gain {words}" if is_clear(rise, error) else f"gain {words}, not clear"
 

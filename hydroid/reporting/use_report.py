@@ -102,7 +102,7 @@ def _row(run: FinishedRun, joint: int) -> tuple[Cell, ...]:
     ends = "no ends"
     if not one.continuous:
         low, high = (plain(float(f"{end:.4g}")) for end in one.range)
-        ends = f"{low} to {high} {unit}".replace("-", "−")
+        ends = f"{low} to {high} {unit}"
     return (
         one.name,
         _column(command, "command"),
@@ -121,7 +121,7 @@ def _column(columns: ColumnMap | None, what: str) -> str:
         return f"{names}: {what} in {columns.unit}"
     sign = "−" if columns.offset < 0 else "+"
     offset = f" {sign} {plain(abs(columns.offset))}" if columns.offset else ""
-    scale = plain(columns.scale).replace("-", "−")
+    scale = plain(columns.scale)
     return f"{names}: {what} [{columns.unit}] = {scale} · cell{offset}"
 
 

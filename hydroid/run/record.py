@@ -99,7 +99,7 @@ class FinishedRun:
 
     After a joint refinement every parameter that was refined is free in the settings.
     Those are of the final estimate; `begun` are the settings with all terms that the fit
-    could have added, None where these are the same.
+    could have added. None: they are not known.
     """
 
     folder: str

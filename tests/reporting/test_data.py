@@ -56,7 +56,7 @@ def test_each_log_says_how_it_was_recorded_and_which_joint_moves_how_far():
     first, second = lines(table)
     travel = np.degrees(np.ptp(fitted.angle[:, 1]))
     assert first[:5] == ["a.csv", "fitted", "4", "201", "50, steps 18 to 31 ms"]
-    assert first[5:] == [f"{travel:.2g} (−30 to +50 %)", "stands"]
+    assert first[5:] == [f"{travel:.2g} (-30 to +50 %)", "stands"]
     assert second[:5] == ["b.csv", "unseen", "4", "400", "100, even"]
     assert second[5] == "stands"
     assert second[6].endswith("(0 to +40 %)")
@@ -142,7 +142,7 @@ def test_a_telescope_moves_by_millimetres(tmp_path):
     section = data_section(run)
     table = section.tables["logs"]
     assert table.header[-1] == "telescope [mm]"
-    assert lines(table)[0][-1] == "1250 (−50 to +50 %)"
+    assert lines(table)[0][-1] == "1250 (-50 to +50 %)"
     # one joint is never together with others
     assert "Joints together" not in " ".join(section.points)
     assert "two or more" not in section.answer

@@ -113,7 +113,7 @@ def test_a_term_that_was_dropped_says_what_it_gained():
         estimates={"refined+pump": tried}, tried={"curve_shoulder": (2.0, 4.0)}
     )
     assert effects[PUMP.name] == Contained(
-        PUMP.name, REJECTED, "gain −1.2 ± 2.5, not clear"
+        PUMP.name, REJECTED, "gain -1.2 ± 2.5, not clear"
     )
     bends = effects["bends in the valve's curve"]
     assert bends.state == REJECTED
@@ -176,8 +176,8 @@ def test_columns_and_signs_are_those_of_the_logs():
     settings = PROBLEM.settings.changed({"log.joints": joints})
     run = run_with(settings, joints=(2,))
     ((joint, command, _, angle, ends),) = use_section(run).tables["units"].rows
-    assert (joint, angle, ends) == ("shoulder", "q2_deg: angle in deg", "−30 to 90 deg")
-    assert command == "lever_V: command [%] = −10 · cell + 5"
+    assert (joint, angle, ends) == ("shoulder", "q2_deg: angle in deg", "-30 to 90 deg")
+    assert command == "lever_V: command [%] = -10 · cell + 5"
 
 
 def test_a_telescope_is_in_metres_and_extends(tmp_path):

@@ -20,7 +20,7 @@ from made_logs import noisy, simulate_log, step_log
 from recovery import refined, settings_of
 
 from hydroid.arrays import Array
-from hydroid.fitting.multistart import by_speeds
+from hydroid.fitting.starts import by_speeds
 from hydroid.log import Log
 from hydroid.posterior.quantities import quantities
 from hydroid.posterior.uncertainty import uncertainty

@@ -23,8 +23,14 @@ from hydroid.fitting.left_out import (
     is_clear,
     predict_blocks,
 )
-from hydroid.fitting.multistart import alone, by_speeds, has_curve, lone_joints
+from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.fitting.refinement import Refinement, promised, refine, refine_from_afar
+from hydroid.fitting.starts import (
+    by_speeds,
+    has_curve,
+    with_other_pumps,
+    with_other_valve,
+)
 from hydroid.fitting.step import Step, step_of
 from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.posterior.linear import estimate_box
@@ -46,6 +52,10 @@ BENDS = 0.3
 """the same for what a valve's curve promises: it bends to any errors a little"""
 ANEW = 3
 """number of the start from which the kept estimate is refined again"""
+JOINTS_ANEW = 4
+"""number of the start with joints that began alone elsewhere"""
+OTHER_PUMP = 5
+"""number of the first start with another kind of pump"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -176,6 +186,7 @@ class Ladder:
             for term in self._step.terms:
                 self._try_without(whole, term, on_the_way)
         if anew:
+            self._begin_joints_anew(on_the_way)
             self._begin_anew(on_the_way)
             self._end(refinement)
         if settings.joint_refinement:
@@ -262,12 +273,52 @@ class Ladder:
         if self._late or self._begun_anew == self._step:
             return
         self._begun_anew = self._step
-        problem = self.problem
-        likelihood = make_likelihood(problem)
         step = self._step.changed(start=ANEW, phase="on the way")
-        end = self._refined_anew(problem, self.kept.theta, settings, step)
+        end = self._refined_anew(self.problem, self.kept.theta, settings, step)
+        self._keep_likelier(end)
+
+    def _begin_joints_anew(self, settings: RefinementSettings) -> None:
+        """Refine the kept estimate once more, with each joint that errs by more than
+        noise as it is from elsewhere, where that is much likelier.
+
+        What slows a joint under load may be its valve or its lever, and how late it is
+        a delay or a lag: least squares settles for one and does not leave it, whatever
+        the model gets later. So a joint begins where the settings do, a valve with a
+        curve at the speeds that the logs show, and once more with the other kind of
+        valve. With a pump still to come they would stand for that.
+        """
+        problem = self.problem
+        theta = self.kept.theta
+        if _share_pump(problem, theta):
+            return
+        for joint in lone_joints(problem):
+            own = alone(problem, joint, theta)
+            if own.leaves_noise(theta):
+                continue
+            begun = np.where(own.parameters.free, problem.parameters.start, theta)
+            starts = (
+                by_speeds(problem, joint, begun),
+                with_other_valve(problem, joint, theta),
+            )
+            for number, start in enumerate(starts, ANEW):
+                if self._late:
+                    return
+                step = self._step.changed(start=number, joint=joint)
+                end = self._refined_anew(own, start, settings, step)
+                reached = own.parameters.from_unit(end.point)
+                theta = _likelier(problem, theta, reached)
+        if theta is not self.kept.theta:
+            step = self._step.changed(start=JOINTS_ANEW, phase="on the way")
+            end = self._refined(make_likelihood(problem), theta, settings, step)
+            self._keep_likelier(end)
+
+    def _keep_likelier(self, end: Refinement) -> None:
+        """Keep another end of the kept model's least squares where it is likelier, by
+        the errors as they are."""
         if self._late:
             return
+        problem = self.problem
+        likelihood = make_likelihood(problem)
         theta = problem.parameters.from_unit(end.point)
         gained = likelihood.log_posterior(theta)
         gained -= likelihood.log_posterior(self.kept.theta)
@@ -316,10 +367,7 @@ class Ladder:
         begin = self._beginning(own, begun, settings, step)
         if begin is None:
             return
-        how = refine_from_afar if begin.far else refine
-        on_the_way = step.changed(phase="on the way")
-        likelihood = make_likelihood(own)
-        result = self._refined(likelihood, begin.theta, settings, on_the_way, how)
+        result = self._on_the_way(own, begin, settings, step)
         if self._late and if_better:
             return
         new = self._measured(own, result, step)
@@ -334,6 +382,28 @@ class Ladder:
                         self._note_dropped(term, gained)
                 return
         self._keep(own, new, step)
+
+    def _on_the_way(
+        self,
+        problem: Problem,
+        begin: "_Beginning",
+        settings: RefinementSettings,
+        step: Step,
+    ) -> Refinement:
+        """Refine a model from where it begins, one that has got a shared pump from each
+        kind of pump; return the likeliest end."""
+        how = refine_from_afar if begin.far else refine
+        on_the_way = step.changed(phase="on the way")
+        starts = {on_the_way: begin.theta}
+        others = with_other_pumps(problem, self.problem, begin.theta)
+        for number, theta in enumerate(others, OTHER_PUMP):
+            starts[on_the_way.changed(start=number)] = theta
+        likelihood = make_likelihood(problem)
+        ends = list[Refinement]()
+        for tried, theta in starts.items():
+            if not ends or not self._late:
+                ends.append(self._refined(likelihood, theta, settings, tried, how))
+        return min(ends, key=lambda end: end.negative_log)
 
     def _beginning(
         self,
@@ -694,17 +764,22 @@ def _likelier(problem: Problem, theta: Array, other: Array) -> Array:
     return other if costs[1] < costs[0] - LESS * samples else theta
 
 
+def _share_pump(problem: Problem, theta: Array) -> bool:
+    """Return whether joints share a pump at theta, (P,): what those that follow their
+    logs take from it is then not known well enough to fit one alone."""
+    pump_flow = problem.bindings.candidates(theta[None]).joints.pump_flow
+    return bool(np.isfinite(pump_flow).any())
+
+
 def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
     """Return the joints, from 1, that begin alone: all that is new in the model is of
     single joints, and of these.
 
-    None where joints share a pump: what those that follow their logs take from it is
-    not known well enough.
+    None where joints share a pump.
     """
     new = {*problem.settings.parameters} - {*last.settings.parameters}
     own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
-    pump_flow = problem.bindings.candidates(theta[None]).joints.pump_flow
-    if np.isfinite(pump_flow).any():
+    if _share_pump(problem, theta):
         return []
     if new != set[str]().union(*own.values()):
         return []

@@ -17,24 +17,21 @@ to the refinement that follows the search.
 """
 
 from collections import defaultdict
-from collections.abc import Mapping
 from operator import itemgetter
 
 import numpy as np
 from numpy.random import Generator
 
-from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
+from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.first_answer import first_answer
 from hydroid.fitting.refinement import Refining, refine
+from hydroid.fitting.starts import by_numbers, by_speeds
 from hydroid.fitting.step import Step
-from hydroid.fitting.valve_start import fitted_valve
 from hydroid.parameters import Array
-from hydroid.posterior.bench import make_bench
 from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER, NOTE
-from hydroid.quantity_table import CURVE
 from hydroid.search.chromosomes import Genes
 from hydroid.search.genetic import Population
 
@@ -42,9 +39,6 @@ DRAWS = 64  # candidates drawn for a start that can be simulated
 MOVES = 0.01
 """part of an angle's travel over the whole record, below which a shorter part of it
 shows no motion"""
-HALF = 0.5
-"""part of the lag that is before the dead band, and of the load that is compensated,
-where a start knows neither"""
 COST = itemgetter(0)  # of a negative log-likelihood and the theta that it is of
 
 
@@ -243,84 +237,3 @@ def alone(problem: Problem, joint: int, theta: Array) -> Problem:
     return problem.varied(
         settings, [log.driving(joint) for log in problem.logs if log.driven[joint - 1]]
     )
-
-
-def by_numbers(problem: Problem, joint: int, theta: Array, found: Baseline) -> Array:
-    """Return theta, (P,), with the valve of a joint whose speed follows the command
-    alone: nine numbers, as they were found."""
-    values = {"delay": found.delay, "pilot_lag": 0.0, "lag_of_speed": 1.0}
-    rows = {"dead_band": 0, "opening_exponent": 1, "opening_lag": 3}
-    for name, row in rows.items():
-        values |= _sided(name, *found.numbers[row].tolist())
-    for name in CURVE:
-        values |= _sided(name, 1.0, 1.0)
-    return _with_valve(problem, joint, theta, values, np.abs(found.numbers[2]))
-
-
-def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
-    """Return theta, (P,), with the valve of a joint at the speeds that its logs show
-    (`speed_curve`).
-
-    Unlike nine numbers, it says neither that no load slows the joint, nor that its
-    lags are all behind the dead band: least squares seldom leaves either again. It is
-    theta itself where its valve has no curve, or the logs show none.
-    """
-    found = fitted_valve(problem.logs, joint) if has_curve(problem, joint) else None
-    if found is None:
-        return theta
-    a, b = found.sides
-    lag = HALF * found.lag
-    values = {"delay": found.delay, "pilot_lag": lag, "opening_lag": lag}
-    values["compensation"] = HALF
-    values |= _sided("dead_band", a.dead_band, b.dead_band)
-    values |= _sided("opening_exponent", a.exponent, b.exponent)
-    for part, name in enumerate(CURVE):
-        values |= _sided(name, a.factors[part], b.factors[part])
-    return _with_valve(problem, joint, theta, values, np.array([a.speed, b.speed]))
-
-
-def has_curve(problem: Problem, joint: int) -> bool:
-    """Return whether a joint's valve has a curve that is estimated, besides its power
-    law."""
-    parameters = problem.settings.parameters
-    own = (parameters[name].quantity for name in problem.settings.acting_on(joint))
-    return any(quantity.startswith(CURVE) for quantity in own)
-
-
-def _sided(name: str, a: float, b: float) -> dict[str, float]:
-    """Return values of a quantity by name: of both sides, and their mean for both."""
-    return {name: (a + b) / 2, f"{name}_a": a, f"{name}_b": b}
-
-
-def _with_valve(
-    problem: Problem,
-    joint: int,
-    theta: Array,
-    values: Mapping[str, float],
-    speeds: Array,
-) -> Array:
-    """Return theta, (P,), with quantities of a joint by name, and openings for its full
-    speeds [rad/s], (2,).
-
-    No load slows it, its actuator is strong enough for any, and its lever is the same
-    everywhere.
-    """
-    settings = problem.settings
-    straight = {"lever_slope": 0.0, "lever_bend": 0.0, "compensation": 1.0}
-    start, places = theta.copy(), dict[str, int]()
-    for i, one in enumerate(settings.parameters.values()):
-        if one.fixed is None and one.joints == (joint,):
-            prior, places[one.quantity] = problem.parameters.parameters[i].prior, i
-            start[i] = {**straight, **values}.get(one.quantity, start[i])
-            if one.quantity.startswith("area") and prior is not None:
-                # a weaker one may stall, where nothing has an effect
-                start[i] = prior.value(1.0)
-    bench = make_bench(settings, problem.logs, joint)
-    for side, (name, full) in enumerate((("opening_a", 100.0), ("opening_b", -100.0))):
-        speed = (
-            bench.movement(full).speeds(problem.bindings.candidates(start[None])).max()
-            / bench.unit[0]
-        )
-        if name in places and speed > 0:  # in proportion, where no load slows it
-            start[places[name]] *= speeds[side] / speed
-    return np.clip(start, problem.parameters.lower, problem.parameters.upper)

@@ -11,7 +11,7 @@ from hydroid.arrays import rms
 from hydroid.fitting.baselines import fit_baselines
 from hydroid.fitting.first_answer import first_answer
 from hydroid.fitting.fit import fit
-from hydroid.fitting.multistart import alone, by_numbers, lone_joints
+from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.problem.problem import Problem
 from hydroid.progress import NOTE
 
@@ -165,40 +165,3 @@ def test_a_single_joint_is_fitted_with_the_others_as_the_settings_say(problem):
         )
         == ()
     )
-
-
-def test_a_start_takes_a_valve_that_no_load_slows_from_nine_numbers():
-    true = {"delay": 0.12, "dead_band": 25.0, "compensation": 1.0, "opening_lag": 0.05}
-    most = {"delay": 0.5, "dead_band": 60.0, "compensation": 1.0, "opening_lag": 0.5}
-    rows = {
-        f"{name}_{j}": {"quantity": name, "joints": [j], "bounds": [0.0, most[name]]}
-        for name in true
-        for j in (2, 3)
-    }
-    coil = {
-        "hydraulics.current_min": 0.8,
-        "hydraulics.slot_width": 0.33,
-        "hydraulics.onset": 0.0,
-    }
-    changes = {
-        "parameters": rows,
-        "outputs": [2, 3],
-        "simulation.model": "quasi-static",
-    }
-    settings = load_settings("fit-hyd", changes | coil)
-    levels = [100.0, -90.0, 60.0, -50.0, 80.0, -70.0, 40.0, -100.0]
-    values = {f"{name}_{j}": value for name, value in true.items() for j in (2, 3)}
-    problem = Problem(settings, [steps_of(settings, values, {2: levels, 3: levels})])
-    lowest = problem.parameters.lower
-    own = alone(problem, 2, lowest)
-    ends = [*settings.arm.ranges.values()][1]
-    nine_numbers = fit_baselines(own.logs, 2, ends)["nine numbers"]
-    start = problem.parameters.mapping(by_numbers(own, 2, lowest, nine_numbers))
-    for name, near in {
-        "delay": 0.03,
-        "dead_band": 5.0,
-        "compensation": 0.0,
-        "opening_lag": 0.03,
-    }.items():
-        assert start[f"{name}_2"] == pytest.approx(true[name], abs=near)
-        assert start[f"{name}_3"] == 0.0

@@ -1,0 +1,149 @@
+"""Where least squares begins: a joint's valve at what its logs show, or at the opposite
+of what an estimate has, and a shared pump of another kind."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hydroid.arrays import Array
+from hydroid.fitting.baselines import Baseline
+from hydroid.fitting.valve_start import fitted_valve
+from hydroid.posterior.bench import make_bench
+from hydroid.problem.problem import Problem
+from hydroid.quantity_table import CURVE
+
+HALF = 0.5
+"""part of the lag that is before the dead band, and of the load that is compensated,
+where a start knows neither"""
+PUMPS = (
+    {"pump_exponent": 20.0, "pump_bypass": 0.0},
+    {"pump_exponent": 5.0, "pump_bypass": 1.5},
+)
+"""kinds of a pump beside one whose pressure falls with the flow: it holds the pressure
+up to a flow, or what no joint takes runs through the valves' open centres"""
+
+
+def by_numbers(problem: Problem, joint: int, theta: Array, found: Baseline) -> Array:
+    """Return theta, (P,), with the valve of a joint whose speed follows the command
+    alone: nine numbers, as they were found."""
+    values = {"delay": found.delay, "pilot_lag": 0.0, "lag_of_speed": 1.0}
+    rows = {"dead_band": 0, "opening_exponent": 1, "opening_lag": 3}
+    for name, row in rows.items():
+        values |= _sided(name, *found.numbers[row].tolist())
+    for name in CURVE:
+        values |= _sided(name, 1.0, 1.0)
+    return _with_valve(problem, joint, theta, values, np.abs(found.numbers[2]))
+
+
+def by_speeds(problem: Problem, joint: int, theta: Array) -> Array:
+    """Return theta, (P,), with the valve of a joint at the speeds that its logs show
+    (`speed_curve`).
+
+    Unlike nine numbers, it says neither that no load slows the joint, nor that its
+    lags are all behind the dead band: least squares seldom leaves either again. It is
+    theta itself where its valve has no curve, or the logs show none.
+    """
+    found = fitted_valve(problem.logs, joint) if has_curve(problem, joint) else None
+    if found is None:
+        return theta
+    a, b = found.sides
+    lag = HALF * found.lag
+    values = {"delay": found.delay, "pilot_lag": lag, "opening_lag": lag}
+    values["compensation"] = HALF
+    values |= _sided("dead_band", a.dead_band, b.dead_band)
+    values |= _sided("opening_exponent", a.exponent, b.exponent)
+    for part, name in enumerate(CURVE):
+        values |= _sided(name, a.factors[part], b.factors[part])
+    return _with_valve(problem, joint, theta, values, np.array([a.speed, b.speed]))
+
+
+def with_other_valve(problem: Problem, joint: int, theta: Array) -> Array:
+    """Return theta, (P,), with a joint whose valve does the opposite of what it does
+    there.
+
+    A load slows it where it did not, or does not where it did. Nothing else is slowed:
+    the lever is the same everywhere, and there is no friction.
+    """
+    start = theta.copy()
+    for i, one in enumerate(problem.settings.parameters.values()):
+        if one.fixed is not None or one.joints != (joint,):
+            continue
+        if one.quantity == "compensation":
+            start[i] = 0.0 if theta[i] > HALF else 1.0
+        elif one.quantity in ("lever_slope", "lever_bend", "damping", "friction"):
+            start[i] = 0.0
+        elif one.quantity.startswith("area"):
+            start[i] = problem.parameters.start[i]
+    return np.clip(start, problem.parameters.lower, problem.parameters.upper)
+
+
+def has_curve(problem: Problem, joint: int) -> bool:
+    """Return whether a joint's valve has a curve that is estimated, besides its power
+    law."""
+    parameters = problem.settings.parameters
+    own = (parameters[name].quantity for name in problem.settings.acting_on(joint))
+    return any(quantity.startswith(CURVE) for quantity in own)
+
+
+def _sided(name: str, a: float, b: float) -> dict[str, float]:
+    """Return values of a quantity by name: of both sides, and their mean for both."""
+    return {name: (a + b) / 2, f"{name}_a": a, f"{name}_b": b}
+
+
+def _with_valve(
+    problem: Problem,
+    joint: int,
+    theta: Array,
+    values: Mapping[str, float],
+    speeds: Array,
+) -> Array:
+    """Return theta, (P,), with quantities of a joint by name, and openings for its full
+    speeds [rad/s], (2,).
+
+    No load slows it, its actuator is strong enough for any, and its lever is the same
+    everywhere.
+    """
+    settings = problem.settings
+    straight = {"lever_slope": 0.0, "lever_bend": 0.0, "compensation": 1.0}
+    start, places = theta.copy(), dict[str, int]()
+    for i, one in enumerate(settings.parameters.values()):
+        if one.fixed is None and one.joints == (joint,):
+            prior, places[one.quantity] = problem.parameters.parameters[i].prior, i
+            start[i] = {**straight, **values}.get(one.quantity, start[i])
+            if one.quantity.startswith("area") and prior is not None:
+                # a weaker one may stall, where nothing has an effect
+                start[i] = prior.value(1.0)
+    bench = make_bench(settings, problem.logs, joint)
+    for side, (name, full) in enumerate((("opening_a", 100.0), ("opening_b", -100.0))):
+        speed = (
+            bench.movement(full).speeds(problem.bindings.candidates(start[None])).max()
+            / bench.unit[0]
+        )
+        if name in places and speed > 0:  # in proportion, where no load slows it
+            start[places[name]] *= speeds[side] / speed
+    return np.clip(start, problem.parameters.lower, problem.parameters.upper)
+
+
+def with_other_pumps(problem: Problem, last: Problem, theta: Array) -> list[Array]:
+    """Return theta, (P,), with a shared pump of each of PUMPS; none where the last
+    model has such a pump, too.
+
+    From one kind least squares seldom reaches another one. Where joints have inertia,
+    that is tried once only: it takes long.
+    """
+    if not problem.settings.rung.at_once:
+        return []
+    before = last.settings.parameters
+    places = dict[str, int]()
+    for i, (name, one) in enumerate(problem.settings.parameters.items()):
+        if name not in before and one.fixed is None:
+            places[one.quantity] = i
+    parameters = problem.parameters
+    starts = list[Array]()
+    for pump in PUMPS:
+        if pump.keys() <= places.keys():
+            start = theta.copy()
+            for quantity, value in pump.items():
+                start[places[quantity]] = value
+            starts.append(np.clip(start, parameters.lower, parameters.upper))
+    return starts

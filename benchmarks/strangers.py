@@ -68,6 +68,7 @@ class Case:
 class Ending:
     """What the commands left in a machine's folder.
 
+    tested: joints that the unseen log drives; of the others nothing is judged, (J,).
     errors: unseen rms errors of each of RUNGS [deg], (4, J). inside: share of the
     unseen samples inside the bands [%], (J,). unseen: the log, as hydroid reads it.
     blamed: joints that the verdict does not call predicted, from 1. kept: name of the
@@ -80,6 +81,7 @@ class Ending:
         rows = [
             one.baselines_deg | {RUNGS[-1]: one.unseen_deg} for one in record.verdict
         ]
+        self.tested = np.array([one.unseen_logs > 0 for one in record.verdict])
         self.errors = np.array(
             [[one.get(rung) for one in rows] for rung in RUNGS], float
         )
@@ -111,16 +113,16 @@ class Found:
 
     @property
     def ratio(self) -> Array:
-        """Unseen error over the floor by joint, (J,); infinite where the fit
-        diverged."""
+        """Unseen error over the floor by joint, (J,); infinite where the fit diverged,
+        NaN where nothing was tested."""
         error = np.nan_to_num(self.end.errors[-1], nan=np.inf)
-        return error / self.floor
+        return np.where(self.end.tested, error / self.floor, np.nan)
 
     @property
     def within(self) -> Any:
         """Whether each of RUNGS is good on each joint, (4, J); no error that is NaN is:
-        it diverged."""
-        return self.end.errors <= self.case.good
+        it diverged. What was not tested is no fault."""
+        return (self.end.errors <= self.case.good) | ~self.end.tested
 
     @property
     def silent(self) -> bool:
@@ -261,6 +263,7 @@ def show_inside(found: Sequence[Found]) -> None:
 
 
 def show_ratio(what: str, ratio: Array) -> None:
+    ratio = ratio[~np.isnan(ratio)]
     # an infinite one allows no mean of two
     high = np.quantile(ratio, 0.9, method="higher")
     print(

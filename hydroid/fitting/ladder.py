@@ -28,7 +28,7 @@ from hydroid.fitting.refinement import Refinement, promised, refine, refine_from
 from hydroid.fitting.starts import (
     by_speeds,
     has_curve,
-    with_other_pumps,
+    with_open_centre,
     with_other_valve,
 )
 from hydroid.fitting.step import Step, step_of
@@ -54,8 +54,8 @@ ANEW = 3
 """number of the start from which the kept estimate is refined again"""
 JOINTS_ANEW = 4
 """number of the start with joints that began alone elsewhere"""
-OTHER_PUMP = 5
-"""number of the first start with another kind of pump"""
+OPEN_CENTRE = 5
+"""number of the start with a pump on open centres"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -390,20 +390,18 @@ class Ladder:
         settings: RefinementSettings,
         step: Step,
     ) -> Refinement:
-        """Refine a model from where it begins, one that has got a shared pump from each
-        kind of pump; return the likeliest end."""
+        """Refine a model from where it begins, and one that has got a shared pump from
+        an open centre, too; return the likelier end."""
         how = refine_from_afar if begin.far else refine
-        on_the_way = step.changed(phase="on the way")
-        starts = {on_the_way: begin.theta}
-        others = with_other_pumps(problem, self.problem, begin.theta)
-        for number, theta in enumerate(others, OTHER_PUMP):
-            starts[on_the_way.changed(start=number)] = theta
         likelihood = make_likelihood(problem)
-        ends = list[Refinement]()
-        for tried, theta in starts.items():
-            if not ends or not self._late:
-                ends.append(self._refined(likelihood, theta, settings, tried, how))
-        return min(ends, key=lambda end: end.negative_log)
+        on_the_way = step.changed(phase="on the way")
+        end = self._refined(likelihood, begin.theta, settings, on_the_way, how)
+        open_centre = with_open_centre(problem, self.problem, begin.theta)
+        if open_centre is None or self._late:
+            return end
+        tried = on_the_way.changed(start=OPEN_CENTRE)
+        other = self._refined(likelihood, open_centre, settings, tried, how)
+        return min(end, other, key=lambda one: one.negative_log)
 
     def _beginning(
         self,

@@ -1,5 +1,5 @@
 """Where least squares begins: a joint's valve at what its logs show, or at the opposite
-of what an estimate has, and a shared pump of another kind."""
+of what an estimate has, and a shared pump on open centres."""
 
 from collections.abc import Mapping
 
@@ -15,12 +15,9 @@ from hydroid.quantity_table import CURVE
 HALF = 0.5
 """part of the lag that is before the dead band, and of the load that is compensated,
 where a start knows neither"""
-PUMPS = (
-    {"pump_exponent": 20.0, "pump_bypass": 0.0},
-    {"pump_exponent": 5.0, "pump_bypass": 1.5},
-)
-"""kinds of a pump beside one whose pressure falls with the flow: it holds the pressure
-up to a flow, or what no joint takes runs through the valves' open centres"""
+OPEN_CENTRE = {"pump_exponent": 5.0, "pump_bypass": 1.5}
+"""of a pump that nearly holds its pressure, and whose oil runs through the valves' open
+centres where no joint takes it"""
 
 
 def by_numbers(problem: Problem, joint: int, theta: Array, found: Baseline) -> Array:
@@ -124,26 +121,23 @@ def _with_valve(
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)
 
 
-def with_other_pumps(problem: Problem, last: Problem, theta: Array) -> list[Array]:
-    """Return theta, (P,), with a shared pump of each of PUMPS; none where the last
-    model has such a pump, too.
+def with_open_centre(problem: Problem, last: Problem, theta: Array) -> Array | None:
+    """Return theta, (P,), with a shared pump on open centres, where the last model has
+    no such numbers of a pump; else None.
 
-    From one kind least squares seldom reaches another one. Where joints have inertia,
-    that is tried once only: it takes long.
+    From a pump whose pressure falls with the flow least squares seldom gets there; the
+    way back it finds. Where joints have inertia, that is left out: it takes long.
     """
     if not problem.settings.rung.at_once:
-        return []
+        return None
     before = last.settings.parameters
     places = dict[str, int]()
     for i, (name, one) in enumerate(problem.settings.parameters.items()):
         if name not in before and one.fixed is None:
             places[one.quantity] = i
-    parameters = problem.parameters
-    starts = list[Array]()
-    for pump in PUMPS:
-        if pump.keys() <= places.keys():
-            start = theta.copy()
-            for quantity, value in pump.items():
-                start[places[quantity]] = value
-            starts.append(np.clip(start, parameters.lower, parameters.upper))
-    return starts
+    if not OPEN_CENTRE.keys() <= places.keys():
+        return None
+    start = theta.copy()
+    for quantity, value in OPEN_CENTRE.items():
+        start[places[quantity]] = value
+    return np.clip(start, problem.parameters.lower, problem.parameters.upper)

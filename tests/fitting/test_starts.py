@@ -10,9 +10,9 @@ from hydroid import load_settings
 from hydroid.fitting.baselines import fit_baselines
 from hydroid.fitting.multistart import alone
 from hydroid.fitting.starts import (
-    PUMPS,
+    OPEN_CENTRE,
     by_numbers,
-    with_other_pumps,
+    with_open_centre,
     with_other_valve,
 )
 from hydroid.problem.problem import Problem
@@ -59,27 +59,25 @@ def with_pump(model: str) -> tuple[Problem, Problem]:
     return before, before.varied(settings.of_estimate("refined+pump"))
 
 
-def test_a_pump_that_is_new_begins_as_each_kind_and_nothing_else_is_changed():
+def test_a_pump_that_is_new_begins_on_open_centres_and_nothing_else_is_changed():
     before, after = with_pump("quasi-static")
     theta = after.parameters.start
-    names = after.parameters.names
-    starts = with_other_pumps(after, before, theta)
-    assert len(starts) == len(PUMPS)
-    for start, pump in zip(starts, PUMPS, strict=True):
-        values = after.parameters.mapping(start)
-        assert values["P_power"] == pump["pump_exponent"]
-        assert values["P_past"] == pump["pump_bypass"]
-        changed = np.flatnonzero(start != theta)
-        assert {names[i] for i in changed} == {"P_power", "P_past"}
+    start = with_open_centre(after, before, theta)
+    assert start is not None
+    values = after.parameters.mapping(start)
+    assert values["P_power"] == OPEN_CENTRE["pump_exponent"]
+    assert values["P_past"] == OPEN_CENTRE["pump_bypass"]
+    changed = np.flatnonzero(start != theta)
+    assert {after.parameters.names[i] for i in changed} == {"P_power", "P_past"}
 
 
-def test_no_other_pump_is_tried_where_there_was_one_or_where_joints_have_inertia():
+def test_no_open_centre_is_tried_where_there_was_a_pump_or_where_joints_have_inertia():
     before, after = with_pump("quasi-static")
     theta = after.parameters.start
-    assert with_other_pumps(after, after, theta) == []
-    assert with_other_pumps(before, before, before.parameters.start) == []
+    assert with_open_centre(after, after, theta) is None
+    assert with_open_centre(before, before, before.parameters.start) is None
     before, after = with_pump("dynamic")
-    assert with_other_pumps(after, before, theta) == []
+    assert with_open_centre(after, before, theta) is None
 
 
 VALVE = {

@@ -14,19 +14,27 @@ from hydroid.advice.assumptions import assumption_findings, doubts
 from hydroid.advice.design import ExperimentSimulator, Trial, forecast
 from hydroid.advice.experiment import RandomExperiments
 from hydroid.advice.growth import Candidate, promising, score_terms
-from hydroid.advice.terms import joints_of
+from hydroid.advice.terms import Term, joints_of
 from hydroid.arrays import Array
 from hydroid.errors import SettingsError
 from hydroid.estimate import finite
 from hydroid.files import Plain
 from hydroid.findings import Finding
-from hydroid.fitting.left_out import LeftOut, blocks, gain, is_better, refit
+from hydroid.fitting.left_out import (
+    LeftOut,
+    blocks,
+    compared_fit,
+    gain,
+    is_better,
+    refit,
+)
+from hydroid.fitting.multistart import alone, lone_joints
+from hydroid.fitting.starts import likelier, share_pump
 from hydroid.fitting.summary import angle_errors
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.progress import Progress
-from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.log import log_file
 from hydroid.settings.naming import named
@@ -105,7 +113,8 @@ def _tried(
     problem = without.problem
     term = candidate.term
     larger = term.added_to(problem)
-    freed = refit(larger, term.theta(problem, without.theta, candidate.start))
+    begun = term.theta(problem, without.theta, candidate.start)
+    freed = refit(larger, _begun_anew(larger, term, begun))
     value = float(larger.parameters.mapping(freed.theta)[term.name])
     rise, sd = gain(freed, without)
     row: Plain = {
@@ -120,6 +129,25 @@ def _tried(
         row["command"] = freeing_command(problem, entries, run)
         row["improvement_deg"] = improvement(freed, without)
     return row, rise
+
+
+def _begun_anew(problem: Problem, term: Term, theta: Array) -> Array:
+    """Return theta, (P,), with the joint of a term as it is alone from where the
+    settings begin, where that is much likelier.
+
+    What the other parameters have learnt without the term may stand in for it, and
+    least squares would leave the term near nothing.
+    """
+    joints = problem.settings.parameters[term.name].joints or ()
+    alone_too = {*joints} & {*lone_joints(problem)}
+    if len(joints) != 1 or not alone_too or share_pump(problem, theta):
+        return theta
+    own = alone(problem, joints[0], theta)
+    start = np.where(own.parameters.free, problem.parameters.start, theta)
+    place = problem.parameters.names.index(term.name)
+    start[place] = theta[place]
+    end = compared_fit(own, start)
+    return likelier(problem, theta, own.parameters.from_unit(end.point))
 
 
 def improvement(after: LeftOut, before: LeftOut) -> dict[str, tuple[float, float]]:
@@ -266,16 +294,16 @@ def proposed(candidate: Candidate, value: float) -> dict[str, Plain]:
     """Return the entries of `parameters` that free a term, by name.
 
     Its bounds are a fifth and five times the value that was found, with the present
-    value inside. Stage 2 asks for a start of every mechanical parameter that no run of
-    stage 1 gives.
+    value inside. It starts at what was found: least squares seldom gets there from
+    nothing.
     """
     term = candidate.term
     low, high = term.span
     held = value if math.isinf(term.value) else term.value
-    least = low
-    if low:
-        least = min(value / 5.0, held)
-    most = max(5.0 * value, held)
+    # a value may be below 0
+    around = (value / 5.0, 5.0 * value, held)
+    least = min(around) if low else low
+    most = max(around)
     # two digits are enough for a reader
     least = float(f"{max(least, low):.2g}")
     most = float(f"{min(most, high):.2g}")
@@ -284,8 +312,7 @@ def proposed(candidate: Candidate, value: float) -> dict[str, Plain]:
         for name, parameter in term.entries.items()
     }
     entries[term.name]["bounds"] = [least, most]
-    if term.entries[term.name].quantity in MECHANICAL:
-        entries[term.name]["start"] = min(max(held, least), most)
+    entries[term.name]["start"] = float(f"{np.clip(value, least, most):.3g}")
     return entries
 
 

@@ -26,8 +26,11 @@ from hydroid.fitting.left_out import (
 from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.fitting.refinement import Refinement, promised, refine, refine_from_afar
 from hydroid.fitting.starts import (
+    LESS,
     by_speeds,
     has_curve,
+    likelier,
+    share_pump,
     with_open_centre,
     with_other_valve,
 )
@@ -46,8 +49,6 @@ FIRST = 10
 """iterations after which another beginning must err less than the last one"""
 SECONDS = 20.0
 """of each log, over which another model is first tried [s]"""
-LESS = 0.1
-"""part by which errors must fall for a model to be refined"""
 BENDS = 0.3
 """the same for what a valve's curve promises: it bends to any errors a little"""
 ANEW = 3
@@ -289,7 +290,7 @@ class Ladder:
         """
         problem = self.problem
         theta = self.kept.theta
-        if _share_pump(problem, theta):
+        if share_pump(problem, theta):
             return
         for joint in lone_joints(problem):
             own = alone(problem, joint, theta)
@@ -306,7 +307,7 @@ class Ladder:
                 step = self._step.changed(start=number, joint=joint)
                 end = self._refined_anew(own, start, settings, step)
                 reached = own.parameters.from_unit(end.point)
-                theta = _likelier(problem, theta, reached)
+                theta = likelier(problem, theta, reached)
         if theta is not self.kept.theta:
             step = self._step.changed(start=JOINTS_ANEW, phase="on the way")
             end = self._refined(make_likelihood(problem), theta, settings, step)
@@ -525,7 +526,7 @@ class Ladder:
                 theta = alone_with.theta
                 step = tried.changed(joint=0)
             elif alone_with.without is not None:
-                theta = _likelier(problem, theta, alone_with.without)
+                theta = likelier(problem, theta, alone_with.without)
         if self.kept.name not in self.refinements:
             self._rung(whole, step, settings, if_better=False, begun=theta)
         elif step != self._step:
@@ -749,26 +750,6 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     return begun
 
 
-def _likelier(problem: Problem, theta: Array, other: Array) -> Array:
-    """Return another parameter set, (P,), where it makes the errors of all joints
-    together so much likelier than theta that it is worth a refinement; else theta."""
-    costs = [np.inf, np.inf]
-    for k, one in enumerate((theta, other)):
-        errors = problem.output_errors(one[None])
-        if np.isfinite(errors).all():
-            likelihood = make_likelihood(problem).estimated(errors[0])
-            costs[k] = likelihood.negative_log(likelihood.rows(one[None])[0])
-    samples = problem.measured.size / len(problem.settings.outputs)
-    return other if costs[1] < costs[0] - LESS * samples else theta
-
-
-def _share_pump(problem: Problem, theta: Array) -> bool:
-    """Return whether joints share a pump at theta, (P,): what those that follow their
-    logs take from it is then not known well enough to fit one alone."""
-    pump_flow = problem.bindings.candidates(theta[None]).joints.pump_flow
-    return bool(np.isfinite(pump_flow).any())
-
-
 def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
     """Return the joints, from 1, that begin alone: all that is new in the model is of
     single joints, and of these.
@@ -777,7 +758,7 @@ def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
     """
     new = {*problem.settings.parameters} - {*last.settings.parameters}
     own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
-    if _share_pump(problem, theta):
+    if share_pump(problem, theta):
         return []
     if new != set[str]().union(*own.values()):
         return []

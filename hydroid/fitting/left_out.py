@@ -93,10 +93,15 @@ def refit(problem: Problem, theta: Array) -> LeftOut:
 
     Nothing of the fit is shown or stored.
     """
-    likelihood = make_likelihood(problem)
+    return predict_blocks(make_likelihood(problem), compared_fit(problem, theta))
+
+
+def compared_fit(problem: Problem, theta: Array) -> Refinement:
+    """Fit a problem from theta, shape (P,), as far as a comparison needs it; nothing of
+    it is shown or stored."""
     step = Step("compared")
-    end = refine_from_afar(likelihood, theta, COMPARED, lambda *_: False, {}, step)
-    return predict_blocks(likelihood, end)
+    likelihood = make_likelihood(problem)
+    return refine_from_afar(likelihood, theta, COMPARED, lambda *_: False, {}, step)
 
 
 def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:

@@ -9,12 +9,15 @@ from hydroid.arrays import Array
 from hydroid.fitting.baselines import Baseline
 from hydroid.fitting.valve_start import fitted_valve
 from hydroid.posterior.bench import make_bench
+from hydroid.posterior.error_model import make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.quantity_table import CURVE
 
 HALF = 0.5
 """part of the lag that is before the dead band, and of the load that is compensated,
 where a start knows neither"""
+LESS = 0.1
+"""part by which errors must fall for a model, or a start, to be refined"""
 OPEN_CENTRE = {"pump_exponent": 5.0, "pump_bypass": 1.5}
 """of a pump that nearly holds its pressure, and whose oil runs through the valves' open
 centres where no joint takes it"""
@@ -141,3 +144,23 @@ def with_open_centre(problem: Problem, last: Problem, theta: Array) -> Array | N
     for quantity, value in OPEN_CENTRE.items():
         start[places[quantity]] = value
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)
+
+
+def likelier(problem: Problem, theta: Array, other: Array) -> Array:
+    """Return another parameter set, (P,), where it makes the errors of all joints
+    together so much likelier than theta that it is worth a refinement; else theta."""
+    costs = [np.inf, np.inf]
+    for k, one in enumerate((theta, other)):
+        errors = problem.output_errors(one[None])
+        if np.isfinite(errors).all():
+            likelihood = make_likelihood(problem).estimated(errors[0])
+            costs[k] = likelihood.negative_log(likelihood.rows(one[None])[0])
+    samples = problem.measured.size / len(problem.settings.outputs)
+    return other if costs[1] < costs[0] - LESS * samples else theta
+
+
+def share_pump(problem: Problem, theta: Array) -> bool:
+    """Return whether joints share a pump at theta, (P,): what those that follow their
+    logs take from it is then not known well enough to fit one alone."""
+    pump_flow = problem.bindings.candidates(theta[None]).joints.pump_flow
+    return bool(np.isfinite(pump_flow).any())

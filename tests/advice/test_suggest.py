@@ -11,9 +11,9 @@ from recovery import refined
 from two_joints import PARAMETERS, PERIOD, drive, two_joints
 
 from hydroid import load_settings
-from hydroid.advice.growth import promising, score_terms
-from hydroid.advice.suggestions import advice, next_actions
-from hydroid.advice.terms import terms
+from hydroid.advice.growth import Candidate, promising, score_terms
+from hydroid.advice.suggestions import advice, next_actions, proposed
+from hydroid.advice.terms import Term, terms
 from hydroid.log import Log
 from hydroid.posterior.posterior import regular
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
@@ -138,6 +138,26 @@ def test_a_missing_delay_is_found_and_lowers_the_error_on_parts_left_out(
         "state",
         "experiment",
     }
+
+
+@pytest.mark.parametrize(
+    ("span", "held", "value", "bounds"),
+    [
+        ((0.0, 1.0), 0.0, 0.02, [0.0, 0.1]),
+        ((-0.5, 0.5), 0.0, -0.296, [-0.5, 0.0]),
+        ((-0.5, 0.5), 0.0, 0.05, [0.0, 0.25]),
+        ((1.0, 100.0), np.inf, 40.0, [8.0, 100.0]),
+        ((0.1, 10.0), 1.0, 0.4, [0.1, 2.0]),
+    ],
+)
+def test_a_proposed_term_begins_at_what_was_found_within_its_bounds(
+    span, held, value, bounds
+):
+    entry = ParameterSettings(quantity="lever_bend", joints=(2,), bounds=span)
+    term = Term("bend", {"bend": entry}, held)
+    row = proposed(Candidate(term, value, 5.0, 0.0, 9.0), value)["bend"]
+    assert row["bounds"] == bounds
+    assert row["start"] == value
 
 
 def test_a_parameter_that_differs_between_the_sides_is_split():

@@ -159,14 +159,18 @@ def _band(
 ) -> Band:
     """Return the band of an error [rad], (T,), with the rms errors of logs that were
     left out, `unseen` [rad]."""
-    variance = spread.parameters + spread.sensor + spread.drift
+    growing = spread.parameters + spread.drift
+    variance = growing + spread.sensor
     # what is beyond all this on logs that were left out is the model's
     wrong = 0.0
-    widened = 0.0
+    widened = np.zeros(growing.shape)
+    mean = float(np.mean(growing))
     if len(unseen):
         wrong = max(np.mean(np.square(unseen)) - np.mean(variance), 0.0)
         quantile = float(student.ppf(0.5 + COVERAGE / 2, len(unseen)))
-        widened = wrong * (quantile / NORMAL) ** 2
+        # it gathers as the rest does: at the start of a log nothing is wrong yet
+        share = growing / mean if 0.0 < mean < np.inf else 1.0
+        widened += wrong * share * (quantile / NORMAL) ** 2
     half = np.sqrt(posterior.quantile**2 * variance + NORMAL**2 * widened)
     return Band(
         noise=np.sqrt(spread.sensor),

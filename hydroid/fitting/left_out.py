@@ -130,9 +130,9 @@ def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
             end.point,
             rows,
         ).T
-    # a parameter at a bound stays there
-    inside = (end.point > 0.0) & (end.point < 1.0)
-    slopes = np.where(inside, jacobian, 0.0)
+    # a parameter at a bound stays there, and one beside which no simulation holds
+    moves = (end.point > 0.0) & (end.point < 1.0) & np.isfinite(jacobian).all(axis=0)
+    slopes = np.where(moves, jacobian, 0.0)
     errors = problem.output_errors(theta[None])[0]
     innovations = weighing.errors.innovations(errors[None])[0]
     by_error = weighing.errors.errors(slopes[: errors.size].T)

@@ -88,6 +88,20 @@ def test_a_block_is_predicted_as_by_a_fit_without_it():
         np.testing.assert_allclose(found.errors[out], errors[out], atol=1e-4)
 
 
+def test_a_parameter_beside_which_nothing_can_be_simulated_is_held():
+    problem = Problem(MORE, [log_of(seed) for seed in range(2)])
+    likelihood = make_likelihood(problem)
+    end = refined(likelihood, problem.parameters.vector(FAST, "truth"))
+    jacobian = end.jacobian.copy()
+    jacobian[3:, 1] = np.nan
+    left_out = predict_blocks(likelihood, replace(end, jacobian=jacobian))
+    held = np.where(np.arange(3) == 1, 0.0, end.jacobian)
+    expected = predict_blocks(likelihood, replace(end, jacobian=held))
+    np.testing.assert_array_equal(left_out.judged, expected.judged)
+    assert np.ptp(left_out.thetas[:, 1]) == 0.0
+    assert (np.ptp(left_out.thetas[:, [0, 2]], axis=0) > 0.0).all()
+
+
 @pytest.mark.parametrize("stiffness", [1.3, 0.7])
 def test_a_term_that_is_missing_gains_by_more_than_its_uncertainty(stiffness: float):
     logs = [log_of(seed, stiffness) for seed in range(3)]

@@ -32,6 +32,10 @@ from hydroid.posterior.uncertainty import Uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.search.axes import differentiate
 
+GATHERS = 5.0
+"""time from the start of a log within which a model's error gathers [s]; as long as a
+block that is left out (ours)"""
+
 
 @record
 class Band:
@@ -71,7 +75,8 @@ def fitted_bands(
         sensor, drift = error_variances(uncertainty.errors, number, simulated)
         error = channel.measured - simulated
         spread = Spread(sd**2, sensor, drift)
-        bands[channel.log][channel.joint] = _band(posterior, spread, error)
+        period = problem.logs[channel.log].period
+        bands[channel.log][channel.joint] = _band(posterior, spread, error, period)
     return bands
 
 
@@ -112,7 +117,7 @@ def prediction_bands(
         spread = Spread(variances[:, column], sensor, drift)
         error = log.angle_of(joint) - response[:, column]
         unseen = np.radians(left_out.get(f"q{joint}", ()))
-        bands[joint] = _band(posterior, spread, error, unseen)
+        bands[joint] = _band(posterior, spread, error, log.period, unseen)
     return bands
 
 
@@ -155,22 +160,21 @@ def _band(
     posterior: Posterior,
     spread: Spread,
     error: Array,
+    period: float,
     unseen: Sequence[float] | Array = (),
 ) -> Band:
-    """Return the band of an error [rad], (T,), with the rms errors of logs that were
-    left out, `unseen` [rad]."""
-    growing = spread.parameters + spread.drift
-    variance = growing + spread.sensor
+    """Return the band of an error [rad], (T,), of the period [s], with the rms errors
+    of logs that were left out, `unseen` [rad]."""
+    variance = spread.parameters + spread.sensor + spread.drift
     # what is beyond all this on logs that were left out is the model's
     wrong = 0.0
-    widened = np.zeros(growing.shape)
-    mean = float(np.mean(growing))
+    widened = np.zeros(variance.shape)
     if len(unseen):
         wrong = max(np.mean(np.square(unseen)) - np.mean(variance), 0.0)
         quantile = float(student.ppf(0.5 + COVERAGE / 2, len(unseen)))
-        # it gathers as the rest does: at the start of a log nothing is wrong yet
-        share = growing / mean if 0.0 < mean < np.inf else 1.0
-        widened += wrong * share * (quantile / NORMAL) ** 2
+        # at the start of a log nothing is wrong yet
+        share = np.minimum(period * np.arange(len(variance)) / GATHERS, 1.0)
+        widened = wrong * share / np.mean(share) * (quantile / NORMAL) ** 2
     half = np.sqrt(posterior.quantile**2 * variance + NORMAL**2 * widened)
     return Band(
         noise=np.sqrt(spread.sensor),

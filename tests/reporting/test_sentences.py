@@ -34,7 +34,7 @@ def test_the_command_that_frees_a_held_mass_gives_settings_that_need_no_stage_1(
     free = held.model_copy(update={"fixed": None, "bounds": (5.0, 80.0)})
     term = Term("M3", {"M3": free}, 21.17)
     entries = proposed(Candidate(term, 25.0, 9.0, 0.0, 0.1), 25.0)
-    assert entries["M3"]["start"] == 21.17
+    assert entries["M3"]["start"] == 25.0
     command = freeing_command(make_problem(("a b.csv",)), entries, "runs/my fit")
     assert (
         "'a b.csv' --config 'runs/my fit/config.yaml' --start 'runs/my fit' --set 'param"

@@ -55,7 +55,7 @@ ANEW = 3
 """number of the start from which the kept estimate is refined again"""
 JOINTS_ANEW = 4
 """number of the start with joints that began alone elsewhere"""
-OPEN_CENTRE = 5
+PUMP_ANEW = 5
 """number of the start with a pump on open centres"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
@@ -400,7 +400,7 @@ class Ladder:
         open_centre = with_open_centre(problem, self.problem, begin.theta)
         if open_centre is None or self._late:
             return end
-        tried = on_the_way.changed(start=OPEN_CENTRE)
+        tried = on_the_way.changed(start=PUMP_ANEW)
         other = self._refined(likelihood, open_centre, settings, tried, how)
         return min(end, other, key=lambda one: one.negative_log)
 

@@ -126,11 +126,10 @@ class _Beginning(NamedTuple):
 
 
 class _Alone(NamedTuple):
-    """Where a joint alone leads: theta with another term, shape (P + N,), if that is
-    better; else, without it, (P,). Neither: there was no time."""
+    """Where a joint alone leads: the terms of the model, and its theta, shape (P,)."""
 
-    theta: Array | None = None
-    without: Array | None = None
+    terms: tuple[str, ...]
+    theta: Array
 
 
 class Ladder:
@@ -502,31 +501,39 @@ class Ladder:
     def _add_lone_terms(
         self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings
     ) -> None:
-        """Try each term of one joint on that joint alone, which takes seconds; then the
-        better ones together.
+        """Try the terms of each joint on that joint alone, which takes seconds; then
+        the better ones of all joints together.
 
         The other joints follow their logs meanwhile.
         """
         problem = self.problem
         theta = self.kept.theta
         step = self._step
-        for term, joint in lone.items():
-            if term in step.terms:
-                continue
-            tried = step.changed(terms=(*step.terms, term), joint=joint)
-            own = whole.varied(whole.settings.of_estimate(tried.estimate))
-            if not self._promises(own, problem, theta, joint):
-                if not self._late:
+        joints = tuple(dict.fromkeys(lone.values()))
+        for joint in joints:
+            lacking = [
+                term
+                for term, owner in lone.items()
+                if owner == joint and term not in step.terms
+            ]
+            promising = self._promising(whole, problem, theta, step, joint, lacking)
+            if self._late:
+                break
+            for term in lacking:
+                if term not in promising:
                     self._note_alone(term, None)
+            if not promising:
                 continue
-            among = len(lone)
-            alone_with = self._alone(problem, own, theta, tried, settings, among)
-            if alone_with.theta is not None:
-                problem = own
-                theta = alone_with.theta
-                step = tried.changed(joint=0)
-            elif alone_with.without is not None:
-                theta = likelier(problem, theta, alone_with.without)
+            tried = step.changed(terms=(*step.terms, *promising), joint=joint)
+            found = self._alone(whole, problem, theta, tried, settings, len(joints))
+            if self._late:
+                break
+            if found.terms == step.terms:
+                theta = likelier(problem, theta, found.theta)
+                continue
+            step = step.changed(terms=found.terms)
+            problem = whole.varied(whole.settings.of_estimate(step.estimate))
+            theta = found.theta
         if self.kept.name not in self.refinements:
             self._rung(whole, step, settings, if_better=False, begun=theta)
         elif step != self._step:
@@ -537,62 +544,99 @@ class Ladder:
             self._rung(whole, again, settings, if_better=False, begun=theta)
             self._step = step
 
-    def _promises(
-        self, problem: Problem, last: Problem, theta: Array, joint: int
-    ) -> bool:
-        """Return whether another term may gain anything for a joint alone, from the
-        theta of the last problem, (P,).
+    def _promising(
+        self,
+        whole: Problem,
+        last: Problem,
+        theta: Array,
+        step: Step,
+        joint: int,
+        lacking: Sequence[str],
+    ) -> Sequence[str]:
+        """Return which of the terms that a joint lacks may gain anything for it alone,
+        from the theta of the last problem, (P,).
 
-        That takes one Jacobian, and most joints of most machines lack no term.
+        That takes a Jacobian or two, and most joints of most machines lack no term.
         """
-        before = alone(last, joint, theta)
-        if self._late or before.leaves_noise(theta):
-            return False
+        if not lacking or self._late or alone(last, joint, theta).leaves_noise(theta):
+            return ()
         values = last.parameters.mapping(theta)
-        started = problem.parameters.started(values)
-        new = np.array([name not in values for name in problem.settings.parameters])
-        likelihood = make_likelihood(alone(problem, joint, started))
-        least = BENDS if _new_curves(problem, last) else LESS
-        return promised(likelihood.of_independent_errors, started, new) > least
+        others = [term for term in lacking if not whole.settings.bends(term)]
+        for terms, least in ((lacking, BENDS), (others, LESS)):
+            with_them = step.changed(terms=(*step.terms, *terms))
+            problem = whole.varied(whole.settings.of_estimate(with_them.estimate))
+            started = problem.parameters.started(values)
+            new = np.array([name not in values for name in problem.settings.parameters])
+            likelihood = make_likelihood(alone(problem, joint, started))
+            if promised(likelihood.of_independent_errors, started, new) > least:
+                return terms
+            if len(others) in (0, len(lacking)):
+                break
+        return ()
 
     def _alone(
         self,
+        whole: Problem,
         last: Problem,
-        problem: Problem,
         theta: Array,
         step: Step,
         settings: RefinementSettings,
         among: int,
     ) -> "_Alone":
-        """Refine a joint alone without the last term of a step, and with it, from the
-        theta of the last problem, (P,).
+        """Refine a joint alone from the theta of the last problem, (P,), and with all
+        the terms of a step that this lacks; then drop those that it does as well
+        without.
 
-        It is one `among` the terms of joints, of which some seem better by chance. Both
-        begin where independent output errors lead: else what helped the one would
-        count for the term. If these hardly fall with it, it is not refined any further.
+        What one term explains may show only beside another: what a wrong curve of a
+        valve does is hidden while the joint does not ring. The joint is one `among`
+        several, of which some seem better by chance. All begin where independent output
+        errors lead: else what helped the one would count for the terms.
         """
-        before = alone(last, step.joint, theta)
-        step_before = step.changed(terms=step.terms[:-1])
-        begun = self._far_end(before, theta, settings, step_before)
+        joint = step.joint
+        has = last.settings.terms()
+        kept = tuple(term for term in step.terms if term in has)
+        before = alone(last, joint, theta)
+        without_them = step.changed(terms=kept)
+        begun = self._far_end(before, theta, settings, without_them)
         begun_at = before.parameters.from_unit(begun.point)
-        without = self._refined(
-            make_likelihood(before), begun_at, settings, step_before
-        )
+        end = self._refined(make_likelihood(before), begun_at, settings, without_them)
+        without = _Alone(kept, before.parameters.from_unit(end.point))
         enough = begun.negative_log - LESS * before.measured.size
-        after, ends = self._ends_with(last, problem, begun_at, step, settings, enough)
-        if self._late:
-            return _Alone()
-        term = step.terms[-1]
-        self._note_alone(term, None)
-        with_it = min(ends, key=lambda end: end.negative_log, default=None)
-        if with_it is not None:
-            gained = gain(
-                self._left_out_of(after, with_it), self._left_out_of(before, without)
-            )
+        problem = whole.varied(whole.settings.of_estimate(step.estimate))
+        own, ends = self._ends_with(last, problem, begun_at, step, settings, enough)
+        new = [term for term in step.terms if term not in kept]
+        for term in new:
+            self._note_alone(term, None)
+        if self._late or not ends:
+            return without
+        end_with = min(ends, key=lambda one: one.negative_log)
+        left_out = self._left_out_of(own, end_with)
+        gained = gain(left_out, self._left_out_of(before, end))
+        for term in new:
             self._note_alone(term, gained)
-            if is_clear(*gained, among):
-                return _Alone(theta=after.parameters.from_unit(with_it.point))
-        return _Alone(without=before.parameters.from_unit(without.point))
+        if not is_clear(*gained, among):
+            return without
+        found = _Alone(step.terms, own.parameters.from_unit(end_with.point))
+        if len(new) == 1:
+            return found
+        for term in new:
+            fewer = tuple(one for one in found.terms if one != term)
+            if self._late or fewer == kept:
+                break
+            tried = step.changed(terms=fewer)
+            problem = whole.varied(whole.settings.of_estimate(tried.estimate))
+            values = own.parameters.mapping(found.theta)
+            started = problem.parameters.started(values)
+            less = alone(problem, joint, started)
+            end = self._refined_anew(less, started, settings, tried)
+            without_it = self._left_out_of(less, end)
+            gained = gain(left_out, without_it)
+            self._note_alone(term, gained)
+            if not is_clear(*gained):
+                found = _Alone(fewer, less.parameters.from_unit(end.point))
+                own = less
+                left_out = without_it
+        return found
 
     def _ends_with(
         self,
@@ -603,14 +647,13 @@ class Ladder:
         settings: RefinementSettings,
         enough: float,
     ) -> tuple[Problem, list[Refinement]]:
-        """Return the problem of a joint alone with another term, and its refinements
+        """Return the problem of a joint alone with further terms, and its refinements
         from where independent output errors lead, if these are less than `enough`.
 
-        One begins at theta of the last problem, (P,), where the term does nothing yet.
-        A valve's curve also begins at the speeds that the logs show, and all else of
-        the joint where the settings begin: without the curve, load and lags have stood
-        for it. Which of them leads nearer differs from valve to valve, and shows only
-        at the end.
+        One begins at theta of the last problem, (P,). A valve's curve also begins at
+        the speeds that the logs show, and all else of the joint where the settings
+        begin: without the curve, load and lags have stood for it. Which of them leads
+        nearer differs from valve to valve, and shows only at the end.
         """
         nothing = problem.parameters.started(last.parameters.mapping(theta))
         own = alone(problem, step.joint, nothing)

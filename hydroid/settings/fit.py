@@ -13,7 +13,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, find_config
 from hydroid.parameters import ParameterSet
-from hydroid.quantity_table import TARGETS
+from hydroid.quantity_table import CURVE, TARGETS
 from hydroid.rungs import RUNGS, Rung, Stage, Stepping, rungs_of, stage_has
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.expansion import by_group, expanded, with_curves
@@ -230,6 +230,11 @@ class FitSettings(Settings):
             if parameter.term is not None:
                 owners.setdefault(parameter.term, set()).add(parameter.joints)
         return tuple(term for term, joints in owners.items() if joints == {(joint,)})
+
+    def bends(self, term: str) -> bool:
+        """Return whether a term frees the curve of a valve."""
+        own = [one for one in self.parameters.values() if one.term == term]
+        return any(one.quantity.startswith(CURVE) for one in own)
 
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts

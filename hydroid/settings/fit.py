@@ -269,7 +269,7 @@ class FitSettings(Settings):
             is_here = joint in (parameter.joints or (joint,))
             if is_here and parameter.quantity == BY_COMMAND:
                 value = parameter.fixed
-        return self.rung.has(BY_COMMAND) and value == 1.0
+        return self.rung.has(BY_COMMAND) and (value or 0.0) >= 0.5
 
     def ignores(self, quantity: str, joint: int) -> bool:
         """Return whether a quantity has no effect on a joint, numbered from 1, because

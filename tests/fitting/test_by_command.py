@@ -12,7 +12,9 @@ from hydroid.advice.terms import terms
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
 from hydroid.fitting.fit import Fit, Silent, fit
+from hydroid.fitting.starts import valve_alone
 from hydroid.plant import Plant
+from hydroid.posterior.bench import make_bench
 from hydroid.prediction import predict
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
@@ -112,6 +114,33 @@ def test_the_joint_that_follows_its_command_alone_keeps_it(problem, found):
     values = found.problem.parameters.mapping(found.best.theta)
     for name in OPENINGS:
         assert values[name] == pytest.approx(TRUTH[name], rel=0.02)
+
+
+def test_a_fit_of_one_joint_chooses_too(problem):
+    found = fit(problem.varied(problem.settings.changed({"outputs": (2,)})))
+    assert found.final == TILT
+    assert found.tried["by_command_lift"] is None
+
+
+def test_it_begins_at_the_full_speeds_that_it_had_or_at_those_of_the_logs(problem):
+    last, own = (
+        problem.varied(problem.settings.of_estimate(name)) for name in ("refined", TILT)
+    )
+    starts = valve_alone(own, 2, last, last.parameters.start)
+
+    def full_speeds(one: Problem, theta: np.ndarray) -> list[float]:
+        bench = make_bench(one.settings, one.logs, 2)
+        candidates = one.bindings.candidates(theta[None])
+        moved = (bench.movement(full).speeds(candidates) for full in (100.0, -100.0))
+        return [float(speeds.max()) for speeds in moved]
+
+    had = full_speeds(last, last.parameters.start)
+    assert full_speeds(own, starts[0]) == pytest.approx(had, rel=1e-6)
+    true = own.parameters.vector(
+        {name: TRUTH.get(name, 1.0) for name in own.parameters.names}, "truth"
+    )
+    shown = full_speeds(own, starts[1])
+    assert shown == pytest.approx(full_speeds(own, true), rel=0.05)
 
 
 def test_no_joint_that_a_load_slows_takes_it(tmp_path):

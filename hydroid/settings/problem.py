@@ -64,9 +64,9 @@ class ParameterSettings(Settings):
     """name of a term of the model, of one parameter or several: a fit begins without
     it, adds it after the refinement, and keeps it where it foretells parts of the logs
     left out clearly better. One whose parameters all act on one joint is tried on that
-    joint alone. One of `by_command` is tried last: the joint keeps it where load
-    and pump predict it worse, and then has no parameter that it makes idle. null:
-    always there"""
+    joint alone. One of `by_command` (fixed: 1, of one joint) is tried last. The joint
+    keeps it where load and pump predict worse; its parameters that then have no effect
+    are left out. null: always there"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":

@@ -64,6 +64,15 @@ def _targets(*quantities: str) -> frozenset[str]:
     return frozenset(side for name in quantities for side in TARGETS[name])
 
 
+BY_COMMAND = "by_command"
+"""quantity of a joint whose speed follows its command alone, where it is 1"""
+WITHOUT_EFFECT = _targets(
+    *("area", "lever_slope", "lever_bend", "damping", "friction", "dry_friction"),
+    *("stiffness", "compensation", "return", "flow_limit"),
+)
+"""quantities that such a joint does not have: those of its load, and its area and the
+lever of a stand-in, of which its opening alone tells the speed"""
+
 GAIN = Rung(
     name="gain",
     stage="mech",
@@ -96,7 +105,9 @@ DYNAMIC = Rung(
     stage="hyd",
     at_once=False,
     # what stands in the rung below for its oil and its inertia
-    lacks=_targets("gain", "oil_frequency", "oil_damping", "oil_damping_share"),
+    lacks=_targets(
+        *("gain", "oil_frequency", "oil_damping", "oil_damping_share", "by_command")
+    ),
 )
 """valves, oil and arm are stepped together (`simulation.rollout`)"""
 

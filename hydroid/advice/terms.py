@@ -24,7 +24,7 @@ from hydroid.quantity_table import (
     TARGETS,
     Quantity,
 )
-from hydroid.rungs import stage_has
+from hydroid.rungs import BY_COMMAND, stage_has
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.hydraulics import actuator_values
 from hydroid.settings.log import WITH_INPUT
@@ -109,7 +109,9 @@ def _held(problem: Problem) -> Iterator[Term]:
 
 def _means_something(problem: Problem, parameter: ParameterSettings) -> bool:
     """Return whether what moves the joints has such a quantity,
-    and an effect of a group has logs beside it."""
+    and an effect of a group has logs beside it; a choice is no number to be freed."""
+    if parameter.quantity == BY_COMMAND:
+        return False
     if parameter.per is not None:
         groups = {problem.settings.log.group_of(log.source) for log in problem.logs}
         if parameter.per not in groups or len(groups) == 1:
@@ -120,13 +122,20 @@ def _means_something(problem: Problem, parameter: ParameterSettings) -> bool:
 
 def _moving(problem: Problem, quantity: str, joints: Iterable[int]) -> tuple[int, ...]:
     """Return those of some joints that move, by an actuator that has the quantity; none
-    where it is the effect of what the logs do not vary."""
+    where it is the effect of what the logs do not vary.
+
+    A joint whose speed follows its command alone ignores all that load and pump do.
+    """
     told_by = WITH_INPUT.get(quantity)
     if told_by and not varies(problem.logs, told_by):
         return ()
-    every = problem.settings.arm.joints
+    settings = problem.settings
     return tuple(
-        j for j in joints if j in problem.active_joints and every[j - 1].has(quantity)
+        j
+        for j in joints
+        if j in problem.active_joints
+        and settings.arm.joint(j).has(quantity)
+        and not settings.ignores(quantity, j)
     )
 
 

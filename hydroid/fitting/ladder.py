@@ -31,6 +31,7 @@ from hydroid.fitting.starts import (
     has_curve,
     likelier,
     share_pump,
+    valve_alone,
     with_open_centre,
     with_other_valve,
 )
@@ -40,7 +41,7 @@ from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
-from hydroid.rungs import Rung
+from hydroid.rungs import BY_COMMAND, Rung
 from hydroid.search.descent import Ending
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
@@ -57,6 +58,8 @@ JOINTS_ANEW = 4
 """number of the start with joints that began alone elsewhere"""
 PUMP_ANEW = 5
 """number of the start with a pump on open centres"""
+AS_IT_IS = 6
+"""number of the start of a joint alone as it is, beside one by its command alone"""
 FIRM = 1e-3  # gain below which least squares ends where another rung may follow
 
 
@@ -174,7 +177,8 @@ class Ladder:
         further = settings.rungs[1:]
         on_the_way = refinement
         by_starts = settings.search.algorithm == "multistart"
-        anew = bool(further or settings.terms() or by_starts)
+        choices = settings.by_command_terms
+        anew = bool(further or settings.terms() or choices or by_starts)
         if anew:
             tolerance = max(FIRM, refinement.gain_tolerance)
             on_the_way = refinement.changed({"gain_tolerance": tolerance})
@@ -188,6 +192,7 @@ class Ladder:
         if anew:
             self._begin_joints_anew(on_the_way)
             self._begin_anew(on_the_way)
+            self._try_by_command(whole, choices, on_the_way)
             self._end(refinement)
         if settings.joint_refinement:
             joint = self._step.changed(model="joint")
@@ -311,6 +316,66 @@ class Ladder:
             step = self._step.changed(start=JOINTS_ANEW, phase="on the way")
             end = self._refined(make_likelihood(problem), theta, settings, step)
             self._keep_likelier(end)
+
+    def _try_by_command(
+        self, whole: Problem, terms: Mapping[str, int], settings: RefinementSettings
+    ) -> None:
+        """Let the speed of joints follow their commands alone, by a term of each joint,
+        numbered from 1, where that foretells parts left out better than load and pump.
+
+        Each is tried alone, and those that gain are refined together. A joint that
+        errs by no more than noise stays as it is.
+        """
+        problem = self.problem
+        theta = self.kept.theta
+        step = self._step
+        if self._late or not problem.settings.rung.has(BY_COMMAND):
+            return
+        possible = problem.settings.outputs
+        if len(possible) > 1:
+            possible = lone_joints(problem)
+        erring = dict[str, int]()
+        for term, joint in terms.items():
+            self._note_alone(term, None)
+            if joint in possible:
+                own = _of_joint(problem, joint, theta)
+                if not own.leaves_noise(theta):
+                    erring[term] = joint
+        for term, joint in erring.items():
+            tried = step.changed(terms=(*step.terms, term), joint=joint)
+            own = whole.varied(whole.settings.of_estimate(tried.estimate))
+            starts = valve_alone(own, joint, problem, theta)
+            before = _of_joint(problem, joint, theta)
+            after = _of_joint(own, joint, starts[0])
+            as_it_is = self._refined(
+                make_likelihood(before),
+                theta,
+                settings,
+                step.changed(joint=joint, start=AS_IT_IS),
+            )
+            ends = [
+                self._far_end(after, start, settings, tried.changed(start=number))
+                for number, start in enumerate(starts, 1)
+            ]
+            far = min(ends, key=lambda one: one.negative_log)
+            # it has fewer parameters, but where it errs much more it predicts worse
+            enough = as_it_is.negative_log + LESS * before.measured.size
+            if self._late:
+                return
+            if far.negative_log > enough:
+                continue
+            near = after.parameters.from_unit(far.point)
+            end = self._refined(make_likelihood(after), near, settings, tried)
+            gained = gain(
+                self._left_out_of(after, end), self._left_out_of(before, as_it_is)
+            )
+            self._note_alone(term, gained)
+            if is_clear(*gained, len(erring)):
+                problem = own
+                theta = after.parameters.from_unit(end.point)
+                step = tried.changed(joint=0)
+        if step != self._step:
+            self._rung(whole, step, settings, if_better=True, begun=theta)
 
     def _keep_likelier(self, end: Refinement) -> None:
         """Keep another end of the kept model's least squares where it is likelier, by
@@ -779,6 +844,14 @@ class Ladder:
         self.estimates[name] = new
         self.refinements[name] = end
         return new
+
+
+def _of_joint(problem: Problem, joint: int, theta: Array) -> Problem:
+    """Return the problem of a joint alone at theta, (P,): as it is, if it is the only
+    one that is compared."""
+    if problem.settings.outputs == (joint,):
+        return problem
+    return alone(problem, joint, theta)
 
 
 def _begun(problem: Problem, last: Problem, theta: Array) -> Array:

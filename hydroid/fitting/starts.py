@@ -1,12 +1,12 @@
 """Where least squares begins: a joint's valve at what its logs show, or at the opposite
 of what an estimate has, and a shared pump on open centres."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.fitting.baselines import Baseline
+from hydroid.fitting.baselines import NAMES, Baseline, fit_baselines
 from hydroid.fitting.valve_start import fitted_valve
 from hydroid.posterior.bench import make_bench
 from hydroid.posterior.error_model import make_likelihood
@@ -18,6 +18,8 @@ HALF = 0.5
 where a start knows neither"""
 LESS = 0.1
 """part by which errors must fall for a model, or a start, to be refined"""
+FULL = {"opening_a": 100.0, "opening_b": -100.0}
+"""the command that opens a side of a valve fully [%]"""
 OPEN_CENTRE = {"pump_exponent": 5.0, "pump_bypass": 1.5}
 """of a pump that nearly holds its pressure, and whose oil runs through the valves' open
 centres where no joint takes it"""
@@ -77,6 +79,27 @@ def with_other_valve(problem: Problem, joint: int, theta: Array) -> Array:
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)
 
 
+def valve_alone(
+    problem: Problem, joint: int, last: Problem, theta: Array
+) -> tuple[Array, Array]:
+    """Return where a joint may begin whose speed now follows its command alone, (P,)
+    each: with the valve that it has at theta of the last problem, at the same full
+    speeds; and with that of its logs."""
+    kept = problem.parameters.started(last.parameters.mapping(theta))
+    full_speed = _full_speed(last, joint)
+    speeds = np.array([full_speed(theta, full) for full in FULL.values()])
+    own = [*problem.settings.acting_on(joint)]
+    of_joint = np.isin(problem.parameters.names, own)
+    anew = np.where(of_joint, problem.parameters.start, kept)
+    shown = by_speeds(problem, joint, anew)
+    # without a curve, or where logs show none, nine numbers do
+    if shown is anew:
+        ends = [*problem.settings.arm.ranges.values()][joint - 1]
+        simple = fit_baselines(problem.logs, joint, ends)
+        shown = by_numbers(problem, joint, anew, simple[NAMES[-1]])
+    return _with_valve(problem, joint, kept, {}, speeds), shown
+
+
 def has_curve(problem: Problem, joint: int) -> bool:
     """Return whether a joint's valve has a curve that is estimated, besides its power
     law."""
@@ -113,15 +136,24 @@ def _with_valve(
             if one.quantity.startswith("area") and prior is not None:
                 # a weaker one may stall, where nothing has an effect
                 start[i] = prior.value(1.0)
-    bench = make_bench(settings, problem.logs, joint)
-    for side, (name, full) in enumerate((("opening_a", 100.0), ("opening_b", -100.0))):
-        speed = (
-            bench.movement(full).speeds(problem.bindings.candidates(start[None])).max()
-            / bench.unit[0]
-        )
+    full_speed = _full_speed(problem, joint)
+    for side, (name, full) in enumerate(FULL.items()):
+        speed = full_speed(start, full)
         if name in places and speed > 0:  # in proportion, where no load slows it
             start[places[name]] *= speeds[side] / speed
     return np.clip(start, problem.parameters.lower, problem.parameters.upper)
+
+
+def _full_speed(problem: Problem, joint: int) -> Callable[[Array, float], float]:
+    """Return what gives the speed of a joint [rad/s] at theta, (P,), under a full
+    command [%]."""
+    bench = make_bench(problem.settings, problem.logs, joint)
+
+    def full_speed(theta: Array, command: float) -> float:
+        candidates = problem.bindings.candidates(theta[None])
+        return bench.movement(command).speeds(candidates).max() / bench.unit[0]
+
+    return full_speed
 
 
 def with_open_centre(problem: Problem, last: Problem, theta: Array) -> Array | None:

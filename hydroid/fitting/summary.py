@@ -115,6 +115,11 @@ def account(problem: Problem, known: Uncertainty) -> FitSummary:
     findings = _parameter_findings(problem, estimate)
     if logs.differing:
         findings.append(Finding("logs disagree", "warning", logs.differing))
+    settings = problem.settings
+    alone = [j for j in settings.outputs if settings.is_by_command(j)]
+    if alone:
+        names = tuple(map(settings.arm.name_of, alone))
+        findings.append(Finding("by command", "note", names))
     findings += _lasting_findings(problem, errors)
     combinations = identifiability(problem, known).combinations
     several = [names for names in combinations if len(names) > 1]

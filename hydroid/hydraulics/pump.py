@@ -261,7 +261,8 @@ def line_pressure(coefficients, driven, work, line, share: float) -> float:
     """
     pump = coefficients[driven[driven.size - 1]]
     least = lowest(pump)
-    # without pressure actuators take nothing
+    # without pressure actuators take nothing, but those by command: where these take
+    # more than the pump gives, the search ends there, too
     most = line.taken
     if least > 0.0:
         most, _ = taken_from_line(coefficients, driven, work, line, least)

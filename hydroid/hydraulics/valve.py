@@ -31,6 +31,14 @@ that a load does not slow the motion while the supply can lift it. The drop is
 
 with `compensation` κ: 0 without a compensator, as in the article, 1 with an ideal one.
 
+Where a model of load and pump predicts a joint no better than its command alone,
+`by_command` 1 leaves both out. The edge then always has its margin, whatever load,
+friction or supply: what an ideal compensator on an endless supply gives,
+
+    v = C_q a √(2/ρ) √(MARGIN p_S) / A_in.
+
+Its oil still comes from the shared pump.
+
 Oil that is warmer flows more easily, and where a pump has no limit in the model, an
 engine that turns faster moves the joints faster. So all openings are multiplied by
 
@@ -44,7 +52,8 @@ valve stay as they are.
 dynamic         `port_flow` and `meter`: flows that follow from the pressures of the
                 chambers, with leakage, an anti-cavitation valve and p_cr
 quasi-static    `rod_speed`: the same edges solved for the speed at which forces
-                balance, without these three. A flow never runs back to the pump.
+                balance, without these three. A flow never runs back to the pump. It
+                alone has joints by command.
 """
 
 # pyright: reportMissingParameterType=false
@@ -110,12 +119,24 @@ def curved(share, side) -> Any:
     """Part of the full opening on the side's curve, from the part that the power law
     gives."""
     factors = (
-        side.curve_1, side.curve_2, side.curve_3, side.curve_4,
-        side.curve_5, side.curve_6, side.curve_7, side.curve_8,
+        side.curve_1,
+        side.curve_2,
+        side.curve_3,
+        side.curve_4,
+        side.curve_5,
+        side.curve_6,
+        side.curve_7,
+        side.curve_8,
     )
     ends = (
-        side.knot_1, side.knot_2, side.knot_3, side.knot_4,
-        side.knot_5, side.knot_6, side.knot_7, side.knot_8,
+        side.knot_1,
+        side.knot_2,
+        side.knot_3,
+        side.knot_4,
+        side.knot_5,
+        side.knot_6,
+        side.knot_7,
+        side.knot_8,
     )
     return bent_opening(share, factors, ends)
 
@@ -221,6 +242,9 @@ def rod_speed(c, w, supply: float) -> Any:
         return 0.0, 0.0, 0.0
     side, other, sign = (c.a, c.b, 1.0) if w.open_area > 0.0 else (c.b, c.a, -1.0)
     area = (1.0 + w.faster) * abs(w.open_area)
+    if c.by_command >= 0.5:
+        flow = c.conductance * area * np.sqrt(MARGIN * c.supply_pressure)
+        return flow / side.area, side.draw * flow, 0.0
     load = sign * w.push + w.thrust
     drag = w.drag
     # what the drops over both edges take from the force of the oil, over v²

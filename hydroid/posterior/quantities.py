@@ -384,7 +384,12 @@ class DirectionTest:
         yield Figure(self.rise, "time_constant", f"time constant {at}", "s", lag)
 
     def _full_flow(self, candidates: Candidates, speed: Array) -> Iterator[Figure]:
-        """Return the flow into the chamber at full command, from the speed there."""
+        """Return the flow into the chamber at full command, from the speed there.
+
+        A joint whose speed follows its command alone tells no area.
+        """
+        if self.bench.settings.ignores("area", self.bench.joint):
+            return
         c, _, arm = actuator(self.bench, candidates)
         side = c.a if self.direction.sign > 0 else c.b
         # from m³/s to L/min

@@ -72,9 +72,10 @@ def _is_off(settings: FitSettings, name: str) -> bool:
 
 
 def _held_joints(settings: FitSettings, name: str) -> list[int]:
-    """Return the compared joints of which no parameter states a quantity."""
+    """Return the compared joints that have a quantity, and of which no parameter states
+    it."""
     base = name.removesuffix("_a").removesuffix("_b")
-    held = [*settings.outputs]
+    held = [joint for joint in settings.outputs if not settings.ignores(name, joint)]
     for parameter in settings.parameters.values():
         # an effect of a group of logs adds to the value
         if parameter.per is None and parameter.quantity in (name, base):

@@ -11,7 +11,7 @@ from hydroid.fitting.step import step_of
 from hydroid.quantity_table import CHOICES, HYDRAULIC, TARGETS
 from hydroid.reporting.page import Section, Table
 from hydroid.run.record import FinishedRun
-from hydroid.rungs import GAIN, RUNGS
+from hydroid.rungs import BY_COMMAND, GAIN, RUNGS
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.problem import ParameterSettings
 from hydroid.words import listed, plain, two_digits
@@ -76,6 +76,11 @@ PUMP = Effect(
     ("pump_flow",),
     instead="the pump gives any flow",
 )
+COMMAND_ALONE = Effect(
+    "speed by the command alone",
+    (BY_COMMAND,),
+    instead="load and pump act on the speed of every joint",
+)
 STOPS = Effect("end stops of the joints", ("stop_penetration",))
 HYDRAULICS = "hydraulics: delay, dead band, valves, leakage, compressible oil, pump"
 """what stage 1 has none of, in one row"""
@@ -131,6 +136,7 @@ EFFECTS = (
         ("draw",),
         instead="the pump gives all that a chamber takes",
     ),
+    COMMAND_ALONE,
     Effect("leakage of the valves", ("leakage",)),
     Effect("anti-cavitation valves", ("anticavitation",)),
     Effect(
@@ -262,6 +268,8 @@ def _stated(
     if effect is STOPS:
         how = "rigid" if settings.rung.at_once else "stiff"
         return Contained(effect.name, IN, f"{how}, at the ends of each joint's range")
+    if effect is COMMAND_ALONE:
+        return _command_alone(settings, trials)
     places = [*_places(settings, effect)]
     tested = _tested(settings, effect, trials)
     if all(place.state == OFF for place in places):
@@ -272,6 +280,26 @@ def _stated(
     if tested:
         ways.append(f"{REJECTED}: {tested}")
     return Contained(effect.name, IN, "; ".join(ways))
+
+
+def _command_alone(settings: FitSettings, trials: Sequence[_Trial]) -> Contained:
+    """Return which joints follow their commands alone, and what that gained where it was
+    tried in vain."""
+    name = COMMAND_ALONE.name
+    tested = _tested(settings, COMMAND_ALONE, trials)
+    joints = _by_command(settings)
+    if joints:
+        how = f"{listed(joints)}: load and pump do not predict it better"
+        return Contained(name, IN, f"{how}; {REJECTED}: {tested}" if tested else how)
+    if tested:
+        return Contained(name, REJECTED, tested)
+    return Contained(name, OUT, COMMAND_ALONE.instead)
+
+
+def _by_command(settings: FitSettings) -> list[str]:
+    """Return the names of the compared joints whose speed follows the command alone."""
+    outputs = settings.outputs
+    return [settings.arm.name_of(j) for j in outputs if settings.is_by_command(j)]
 
 
 def _tested(settings: FitSettings, effect: Effect, trials: Sequence[_Trial]) -> str:
@@ -317,7 +345,7 @@ def _best(settings: FitSettings, effect: Effect, joint: int) -> _Of:
 
 def _of(settings: FitSettings, side: str, joint: int) -> _Of:
     """Return what a fit has of a quantity, or one of its two sides, at a joint."""
-    if side in settings.rung.lacks:
+    if side in settings.rung.lacks or settings.ignores(side, joint):
         return _Of(joint, OFF)
     # a parameter goes before the settings, and these before what is usual
     value = CHOICES[side].default
@@ -482,7 +510,10 @@ def _coupling(
     pump = by_name.get(PUMP.name)
     if settings.stage == "hyd" and len(settings.outputs) > 1:
         if pump is not None and pump.state == IN:
-            yield Contained(SHARED, IN, "what one joint takes, the others lack")
+            how = "what one joint takes, the others lack"
+            if unmoved := _by_command(settings):
+                how += f"; it does not slow {listed(unmoved)}"
+            yield Contained(SHARED, IN, how)
         else:
             yield Contained(SHARED, OUT, "every joint has the full supply pressure")
     how = "weight changes with the pose of all joints"
@@ -500,7 +531,8 @@ def _dropped(run: FinishedRun) -> list[_Trial]:
     # the settings of the final model no longer have the terms that it dropped
     begun = run.begun or run.settings
     kept = step_of(run.summary.final or "").terms
-    return [_trial(run, begun, term) for term in begun.terms() if term not in kept]
+    every = (*begun.terms(), *begun.by_command_terms)
+    return [_trial(run, begun, term) for term in every if term not in kept]
 
 
 def _trial(run: FinishedRun, begun: FitSettings, term: str) -> _Trial:

@@ -14,7 +14,16 @@ from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, find_config
 from hydroid.parameters import ParameterSet
 from hydroid.quantity_table import CURVE, TARGETS
-from hydroid.rungs import RUNGS, Rung, Stage, Stepping, rungs_of, stage_has
+from hydroid.rungs import (
+    BY_COMMAND,
+    RUNGS,
+    WITHOUT_EFFECT,
+    Rung,
+    Stage,
+    Stepping,
+    rungs_of,
+    stage_has,
+)
 from hydroid.settings.arm import Arm, load_arm
 from hydroid.settings.expansion import by_group, expanded, with_curves
 from hydroid.settings.hydraulics import HydraulicSettings
@@ -176,6 +185,12 @@ class FitSettings(Settings):
                 raise ValueError(
                     f"parameters.{name}: {quantity} needs the column log.{told_by}"
                 )
+        chosen = [p for p in self.parameters.values() if p.quantity == BY_COMMAND]
+        terms = [parameter.term for parameter in chosen if parameter.term]
+        if len({*terms}) < len(terms):
+            raise ValueError(
+                f"parameters: each {BY_COMMAND} with a term needs one of its own"
+            )
         # this raises where a parameter cannot be made
         self.parameter_set()
         return self
@@ -214,11 +229,15 @@ class FitSettings(Settings):
 
     def terms(self, rung: Rung | None = None) -> tuple[str, ...]:
         """Names of the terms that a fit may add, in the order of the parameters; of a
-        rung those alone that have an effect there."""
+        rung those alone that have an effect there.
+
+        Those of `by_command_terms` are none of them: nothing of these is estimated.
+        """
         names = (
             parameter.term
             for parameter in self.parameters.values()
             if parameter.term is not None
+            and parameter.quantity != BY_COMMAND
             and (rung is None or rung.has(parameter.quantity))
         )
         return tuple(dict.fromkeys(names))
@@ -227,7 +246,7 @@ class FitSettings(Settings):
         """Names of the terms whose parameters all act on one joint, numbered from 1."""
         owners = dict[str, set[tuple[int, ...] | None]]()
         for parameter in self.parameters.values():
-            if parameter.term is not None:
+            if parameter.term is not None and parameter.quantity != BY_COMMAND:
                 owners.setdefault(parameter.term, set()).add(parameter.joints)
         return tuple(term for term, joints in owners.items() if joints == {(joint,)})
 
@@ -235,6 +254,34 @@ class FitSettings(Settings):
         """Return whether a term frees the curve of a valve."""
         own = [one for one in self.parameters.values() if one.term == term]
         return any(one.quantity.startswith(CURVE) for one in own)
+
+    @property
+    def by_command_terms(self) -> dict[str, int]:
+        """Names of the terms by which the speed of one joint follows its command alone,
+        and that joint, numbered from 1."""
+        return {
+            parameter.term: joint
+            for parameter in self.parameters.values()
+            if parameter.quantity == BY_COMMAND and parameter.term is not None
+            for joint in parameter.joints or ()
+        }
+
+    def is_by_command(self, joint: int) -> bool:
+        """Return whether the speed of a joint, numbered from 1, follows its command
+        alone in the model that is simulated."""
+        value = getattr(self.hydraulics, BY_COMMAND)
+        for parameter in self.parameters.values():
+            is_here = joint in (parameter.joints or (joint,))
+            if is_here and parameter.quantity == BY_COMMAND:
+                value = parameter.fixed
+        return self.rung.has(BY_COMMAND) and (value or 0.0) >= 0.5
+
+    def ignores(self, quantity: str, joint: int) -> bool:
+        """Return whether a quantity has no effect on a joint, numbered from 1, because
+        its speed follows its command alone."""
+        return WITHOUT_EFFECT.issuperset(TARGETS[quantity]) and self.is_by_command(
+            joint
+        )
 
     def of_estimate(self, name: str | None) -> "FitSettings":
         """Return the settings that an estimate of a fit was refined with, and predicts
@@ -250,11 +297,9 @@ class FitSettings(Settings):
         # a joint refinement frees what the search had fixed
         if model == "joint":
             settings = self._all_free()
-        if self.terms() != tuple(terms):
-            settings = settings._with_terms(terms)
         if model in RUNGS:
             settings = settings.on(RUNGS[model])
-        return settings
+        return settings._with_terms(terms)
 
     def on(self, rung: Rung) -> "FitSettings":
         """Return the settings of one rung of their stage alone."""
@@ -272,18 +317,36 @@ class FitSettings(Settings):
         return self.with_parameters(changed)
 
     def _with_terms(self, terms: Collection[str]) -> "FitSettings":
-        """Return the settings without the parameters of all other terms, and the priors
-        on these."""
+        """Return the settings without the parameters of all other terms, and without
+        those that then have no effect, as the speed of their joints follows the
+        commands alone."""
+        others = {
+            name
+            for name, parameter in self.parameters.items()
+            if parameter.term is not None and parameter.term not in terms
+        }
+        settings = self._without(others)
+        idle = {
+            name
+            for name, parameter in settings.parameters.items()
+            if parameter.joints
+            and all(settings.ignores(parameter.quantity, j) for j in parameter.joints)
+        }
+        return settings._without(idle)
+
+    def _without(self, names: set[str]) -> "FitSettings":
+        """Return the settings without some parameters, and the priors on these."""
+        if not names:
+            return self
         kept = {
             name: parameter
             for name, parameter in self.parameters.items()
-            if parameter.term is None or parameter.term in terms
+            if name not in names
         }
-        left_out = self.parameters.keys() - kept.keys()
         priors = {
             name: prior
             for name, prior in self.priors.items()
-            if left_out.isdisjoint(prior.names)
+            if names.isdisjoint(prior.names)
         }
         return self.changed({"parameters": kept, "priors": priors})
 

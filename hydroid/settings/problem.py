@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from hydroid.arrays import Limits
 from hydroid.quantity_table import CHOICES, MECHANICAL
-from hydroid.rungs import Climb
+from hydroid.rungs import BY_COMMAND, Climb
 from hydroid.settings.load import ByJoint, Joints, NotNegative, Positive, Settings
 
 
@@ -64,7 +64,9 @@ class ParameterSettings(Settings):
     """name of a term of the model, of one parameter or several: a fit begins without
     it, adds it after the refinement, and keeps it where it foretells parts of the logs
     left out clearly better. One whose parameters all act on one joint is tried on that
-    joint alone. null: always there"""
+    joint alone. One of `by_command` (fixed: 1, of one joint) is tried last. The joint
+    keeps it where load and pump predict worse; its parameters that then have no effect
+    are left out. null: always there"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "ParameterSettings":
@@ -72,6 +74,7 @@ class ParameterSettings(Settings):
         self._check_place()
         self._check_knowledge()
         self._check_values()
+        self._check_choice()
         return self
 
     def _check_quantity(self) -> None:
@@ -110,6 +113,16 @@ class ParameterSettings(Settings):
             raise ValueError(
                 "needs bounds: [lower, upper], a prior (within: factor), or fixed: value"
             )
+
+    def _check_choice(self) -> None:
+        """Raise ValueError where what is either so or not is to be estimated, or where
+        several joints are to choose as one."""
+        if self.quantity != BY_COMMAND:
+            return
+        if self.fixed not in (0.0, 1.0) or self.per is not None:
+            raise ValueError(f"{BY_COMMAND} is not estimated: needs fixed: 0 or 1")
+        if self.term is not None and len(self.joints or ()) != 1:
+            raise ValueError(f"a term of {BY_COMMAND} names one joint")
 
     def _check_values(self) -> None:
         """Raise ValueError where bounds, nominal value, start or fixed value cannot

@@ -32,6 +32,7 @@ BEHIND_VALVE = [
         "lever_slope",
         "lever_bend",
         "compensation",
+        "by_command",
     ),
     *("engine_exponent", "temperature_effect"),
     *("oil_frequency", "oil_damping", "oil_damping_share"),

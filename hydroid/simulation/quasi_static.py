@@ -17,6 +17,10 @@ actuators share the pump's line, whose pressure P satisfies one equation, Σ Q_i
 Q_P(P) of `hydroid.hydraulics.pump`, with Q_i the flow into the chamber times its
 `draw`.
 
+A joint whose speed follows its command alone (`by_command`) feels none of that, but
+takes its flow from the line: a pump that gives less is empty for the others. Its
+pressures are those that its load asks for.
+
 Commands, delays, coils and plungers are those of the dynamic rollout, law by law. Steps
 are long: what is integrated is the angle alone, with load and lever arm taken at the
 middle of the step. Joints without an actuator stand still. Leakage is left out, so

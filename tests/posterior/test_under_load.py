@@ -68,3 +68,13 @@ def test_a_shut_valve_that_leaks_lets_the_joint_sink():
 
 def test_a_joint_that_gravity_does_not_load_has_no_speeds_under_load():
     assert carried(joint=1).moved == ()
+
+
+def test_no_load_changes_a_speed_that_follows_its_command_alone():
+    alone = {"hydraulics__by_command": 1.0, "simulation__model": "quasi-static"}
+    for moved in carried(**alone).moved:
+        without, *others = (speed.value for speed in moved.speeds)
+        assert without > 0.0
+        assert others == [without, without]
+        assert moved.change is not None
+        assert moved.change.value == 0.0

@@ -12,6 +12,7 @@ import hydroid
 from hydroid.estimate import CurveEstimate, NamedEstimate
 from hydroid.quantity_table import ROWS
 from hydroid.reporting.model_report import (
+    COMMAND_ALONE,
     EFFECTS,
     FRICTION,
     IN,
@@ -129,6 +130,37 @@ def test_a_term_that_was_dropped_says_what_it_gained():
     assert "promised too little" in effects["bends in the valve's curve"].how
     # older runs do not say
     assert "what it gained is not stored" in dropped()[PUMP.name].how
+
+
+def test_joints_whose_speed_follows_the_command_alone_are_named():
+    choices = {
+        f"by_command_{j}": {
+            "quantity": "by_command",
+            "joints": [j],
+            "fixed": 1,
+            "term": f"by_command_{j}",
+        }
+        for j in (2, 3)
+    }
+    begun = settings_of({"flow": TERMS["flow"] | {"term": None}} | choices)
+    begun = begun.changed({"outputs": (2, 3), "simulation.model": "quasi-static"})
+    begun = begun.changed({"hydraulics.compensation": 0.5})
+    final = "refined+by_command_3"
+    tried = {"by_command_2": (2.0, 4.0), "by_command_3": (50.0, 9.0)}
+    settings = begun.of_estimate(final)
+    effects = by_name(run_with(settings, begun, final=final, tried=tried))
+    alone = effects[COMMAND_ALONE.name]
+    assert alone.state == IN
+    assert alone.how == (
+        "elbow: load and pump do not predict it better; "
+        "tested and rejected: shoulder: gain 2 ± 4, not clear"
+    )
+    assert effects[SHARED].how.endswith("it does not slow elbow")
+    assert effects["load compensation of the valves"].how.endswith("off: elbow")
+    effects = by_name(run_with(begun.of_estimate("refined"), begun, final="refined"))
+    assert effects[COMMAND_ALONE.name].state == REJECTED
+    plain = by_name(run_with(hydraulic("quasi-static")))
+    assert plain[COMMAND_ALONE.name].state == OUT
 
 
 def test_a_fit_of_stage_1_lacks_all_hydraulics_in_one_row():

@@ -177,7 +177,8 @@ def cylinder(**values):
         SimpleNamespace(area=area, return_=1.5, draw=1.0) for area in (1000e-6, 750e-6)
     )
     each = {"conductance": 0.7 * np.sqrt(2 / DENSITY), "tank_pressure": 5e5}
-    return SimpleNamespace(a=a, b=b, **each, **values)
+    each |= {"by_command": 0.0, "supply_pressure": 150e5}
+    return SimpleNamespace(a=a, b=b, **each | values)
 
 
 @pytest.mark.parametrize("opening", [4e-7, -4e-7])
@@ -224,6 +225,46 @@ def test_speed_flow_and_pressures_are_continuous_in_the_load(
         k = int(steps.argmax())
         near = [under(load)[i] for load in np.linspace(loads[k], loads[k + 1], 1001)]
         assert np.abs(np.diff(near)).max() < 0.1 * steps[k] + 1e-9 * np.ptp(values)
+
+
+@pytest.mark.parametrize("opening", [4e-7, -4e-7])
+def test_by_command_the_speed_is_that_of_an_ideal_compensator_whatever_the_load(
+    opening,
+):
+    def moved(by_command, load, supply=150e5, drag=0.0, thrust=0.0):
+        limit = 1e-7 if by_command else np.inf
+        c = cylinder(by_command=by_command, compensation=1.0, flow_limit=limit)
+        w = SimpleNamespace(
+            open_area=opening, push=load, thrust=thrust, drag=drag, faster=0.0
+        )
+        return rod_speed(c, w, supply)
+
+    speed, flow, rise = moved(1.0, 0.0)
+    free_speed, free_flow, _ = moved(0.0, 0.0)
+    assert (speed, flow) == pytest.approx((free_speed, free_flow), rel=1e-12)
+    assert rise == 0.0
+    for load in (-1e6, -3e3, 3e3, 1e6):
+        assert moved(1.0, load, 2e5, 1e5, 500.0) == (speed, flow, rise)
+
+
+def test_by_command_a_joint_slows_the_others_and_is_not_slowed(simulated):
+    """Also where it takes all that the pump gives, and more."""
+    tilt = 2
+
+    def ways(commands, flow):
+        by_command = np.arange(7) == ROLL
+        pump = PUMP | {"pump_flow": flow, "by_command": by_command}
+        angle = simulated(commands, 1.0, damping=0.0, **pump)[0]
+        return np.ptp(angle, axis=0)
+
+    alone = ways({ROLL: 60}, 6e-5)[0]
+    free = ways({tilt: 60}, 6e-5)[0]
+    beside = [ways({tilt: 60, ROLL: 60}, flow) for flow in (6e-5, 3e-5, 1e-6)]
+    for _, roll in beside:
+        assert roll == pytest.approx(alone, rel=1e-12)
+    slowed = [way / free for way, _ in beside]
+    assert 1.0 > slowed[0] > slowed[1] > slowed[2]
+    assert slowed[2] < 1e-3
 
 
 @pytest.mark.parametrize("mass", [0.3, 1.0, 2.0])

@@ -359,7 +359,10 @@ class Ladder:
             ]
             far = min(ends, key=lambda one: one.negative_log)
             # it has fewer parameters, but where it errs much more it predicts worse
-            enough = as_it_is.negative_log + LESS * before.measured.size
+            reached = before.parameters.from_unit(as_it_is.point)
+            independent = make_likelihood(before).of_independent_errors
+            enough = independent.negative_log_at(reached)
+            enough += LESS * before.measured.size
             if self._late:
                 return
             if far.negative_log > enough:

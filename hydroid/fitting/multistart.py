@@ -29,7 +29,7 @@ from hydroid.fitting.refinement import Refining, refine
 from hydroid.fitting.starts import by_numbers, by_speeds
 from hydroid.fitting.step import Step
 from hydroid.parameters import Array
-from hydroid.posterior.error_model import Likelihood, likelihood_at, make_likelihood
+from hydroid.posterior.error_model import Likelihood, make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER, NOTE
 from hydroid.search.chromosomes import Genes
@@ -93,11 +93,7 @@ class Multistart:
         if lone_joints(self._problem):
             theta = self._joint_by_joint(number, theta)
             self._memo.elsewhere += 1
-            likelihood = likelihood_at(self._problem, theta)
-            rows = likelihood.rows(theta[None])[0]
-            self._cost = (
-                likelihood.negative_log(rows) if np.isfinite(rows).all() else np.inf
-            )
+            self._cost = make_likelihood(self._problem).negative_log_at(theta)
         else:
             self._cost, theta = self._grown(
                 self._problem, theta, Step("start", start=number + 1)

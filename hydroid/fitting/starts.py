@@ -181,14 +181,11 @@ def with_open_centre(problem: Problem, last: Problem, theta: Array) -> Array | N
 def likelier(problem: Problem, theta: Array, other: Array) -> Array:
     """Return another parameter set, (P,), where it makes the errors of all joints
     together so much likelier than theta that it is worth a refinement; else theta."""
-    costs = [np.inf, np.inf]
-    for k, one in enumerate((theta, other)):
-        errors = problem.output_errors(one[None])
-        if np.isfinite(errors).all():
-            likelihood = make_likelihood(problem).estimated(errors[0])
-            costs[k] = likelihood.negative_log(likelihood.rows(one[None])[0])
+    likelihood = make_likelihood(problem)
+    cost = likelihood.negative_log_at(theta)
+    of_other = likelihood.negative_log_at(other)
     samples = problem.measured.size / len(problem.settings.outputs)
-    return other if costs[1] < costs[0] - LESS * samples else theta
+    return other if of_other < cost - LESS * samples else theta
 
 
 def share_pump(problem: Problem, theta: Array) -> bool:

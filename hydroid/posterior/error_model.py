@@ -391,6 +391,15 @@ class Likelihood:
             total += 0.5 * of_signal.size * logarithm
         return total
 
+    def negative_log_at(self, theta: Array) -> float:
+        """Return `negative_log` of theta, (P,), by a model of its own errors; inf where
+        a simulation diverges."""
+        errors = self.problem.output_errors(theta[None])[0]
+        if not np.isfinite(errors).all():
+            return np.inf
+        own = self.estimated(errors)
+        return own.negative_log(own.rows(theta[None])[0])
+
     def estimated(self, errors: Array, *, nearby: bool = False) -> "Likelihood":
         """Return the likelihood for what weighted output errors, (R,), show of their
         model, `nearby` as `ErrorModel.estimated` does."""

@@ -651,59 +651,82 @@ class Ladder:
         settings: RefinementSettings,
         among: int,
     ) -> "_Alone":
-        """Refine a joint alone from the theta of the last problem, (P,), and with all
-        the terms of a step that this lacks; then drop those that it does as well
-        without.
+        """Refine a joint alone from the theta of the last problem, (P,), and with the
+        terms of a step that this lacks: all of them, and else each.
 
         What one term explains may show only beside another: what a wrong curve of a
-        valve does is hidden while the joint does not ring. The joint is one `among`
-        several, of which some seem better by chance. All begin where independent output
-        errors lead: else what helped the one would count for the terms.
+        valve does is hidden while the joint does not ring. Those that it does as well
+        without are dropped again. The joint is one `among` several, of which some seem
+        better by chance. All begin where independent output errors lead: else what
+        helped the one would count for the terms. Where these hardly fall with a term,
+        it is not refined any further.
         """
-        joint = step.joint
         has = last.settings.terms()
         kept = tuple(term for term in step.terms if term in has)
-        before = alone(last, joint, theta)
+        new = [term for term in step.terms if term not in has]
+        before = alone(last, step.joint, theta)
         without_them = step.changed(terms=kept)
         begun = self._far_end(before, theta, settings, without_them)
         begun_at = before.parameters.from_unit(begun.point)
         end = self._refined(make_likelihood(before), begun_at, settings, without_them)
-        without = _Alone(kept, before.parameters.from_unit(end.point))
         enough = begun.negative_log - LESS * before.measured.size
-        problem = whole.varied(whole.settings.of_estimate(step.estimate))
-        own, ends = self._ends_with(last, problem, begun_at, step, settings, enough)
-        new = [term for term in step.terms if term not in kept]
-        for term in new:
-            self._note_alone(term, None)
-        if self._late or not ends:
-            return without
-        end_with = min(ends, key=lambda one: one.negative_log)
-        left_out = self._left_out_of(own, end_with)
-        gained = gain(left_out, self._left_out_of(before, end))
-        for term in new:
-            self._note_alone(term, gained)
-        if not is_clear(*gained, among):
-            return without
-        found = _Alone(step.terms, own.parameters.from_unit(end_with.point))
-        if len(new) == 1:
-            return found
-        for term in new:
-            fewer = tuple(one for one in found.terms if one != term)
-            if self._late or fewer == kept:
-                break
-            tried = step.changed(terms=fewer)
+        left_out = self._left_out_of(before, end)
+        choices = [new]
+        if len(new) > 1:
+            choices += [[term] for term in new]
+        for terms in choices:
+            tried = step.changed(terms=(*kept, *terms))
             problem = whole.varied(whole.settings.of_estimate(tried.estimate))
-            values = own.parameters.mapping(found.theta)
-            started = problem.parameters.started(values)
-            less = alone(problem, joint, started)
-            end = self._refined_anew(less, started, settings, tried)
-            without_it = self._left_out_of(less, end)
-            gained = gain(left_out, without_it)
+            own, ends = self._ends_with(
+                last, problem, begun_at, tried, settings, enough
+            )
+            if self._late:
+                break
+            for term in terms:
+                self._note_alone(term, None)
+            if not ends:
+                continue
+            end_with = min(ends, key=lambda one: one.negative_log)
+            left_out_with = self._left_out_of(own, end_with)
+            gained = gain(left_out_with, left_out)
+            for term in terms:
+                self._note_alone(term, gained)
+            if is_clear(*gained, among):
+                found = _Alone(tried.terms, own.parameters.from_unit(end_with.point))
+                return self._fewer(
+                    whole, own, found, left_out_with, terms, tried, settings
+                )
+        return _Alone(kept, before.parameters.from_unit(end.point))
+
+    def _fewer(
+        self,
+        whole: Problem,
+        problem: Problem,
+        found: "_Alone",
+        left_out: LeftOut,
+        new: Sequence[str],
+        step: Step,
+        settings: RefinementSettings,
+    ) -> "_Alone":
+        """Drop each of several new terms of a joint alone that its model, with these
+        predictions of parts left out, predicts as well without."""
+        for term in new:
+            terms = tuple(one for one in found.terms if one != term)
+            if self._late or len(new) == 1:
+                break
+            fewer = step.changed(terms=terms)
+            less = whole.varied(whole.settings.of_estimate(fewer.estimate))
+            started = less.parameters.started(problem.parameters.mapping(found.theta))
+            own = alone(less, step.joint, started)
+            end = self._refined_anew(own, started, settings, fewer)
+            without = self._left_out_of(own, end)
+            gained = gain(left_out, without)
             self._note_alone(term, gained)
-            if not is_clear(*gained):
-                found = _Alone(fewer, less.parameters.from_unit(end.point))
-                own = less
-                left_out = without_it
+            if is_clear(*gained):
+                continue
+            found = _Alone(terms, own.parameters.from_unit(end.point))
+            problem = own
+            left_out = without
         return found
 
     def _ends_with(

@@ -70,7 +70,7 @@ DENSITY = 860.0  # ρ of the oil [kg/m³]; ours
 # part of the supply pressure that a compensator leaves the pump edge; ours
 MARGIN = 0.25
 # parts of the spool's travel where the parts of a valve's curve end; ours
-KNOTS = (0.04, 0.1, 0.2, 0.3, 0.4, 0.55, 0.7, 0.85)
+KNOTS = (0.04, 0.15, 0.4, 0.7)
 # part of the travel over which a power law is a line: no edge is sharper; ours
 EDGE = 1e-3
 
@@ -118,26 +118,8 @@ def bent_opening(share, factors, ends) -> Any:
 def curved(share, side) -> Any:
     """Part of the full opening on the side's curve, from the part that the power law
     gives."""
-    factors = (
-        side.curve_1,
-        side.curve_2,
-        side.curve_3,
-        side.curve_4,
-        side.curve_5,
-        side.curve_6,
-        side.curve_7,
-        side.curve_8,
-    )
-    ends = (
-        side.knot_1,
-        side.knot_2,
-        side.knot_3,
-        side.knot_4,
-        side.knot_5,
-        side.knot_6,
-        side.knot_7,
-        side.knot_8,
-    )
+    factors = (side.curve_1, side.curve_2, side.curve_3, side.curve_4)
+    ends = (side.knot_1, side.knot_2, side.knot_3, side.knot_4)
     return bent_opening(share, factors, ends)
 
 

@@ -21,7 +21,7 @@ end with"""
 CURVE_BOUNDS = (0.003, 300.0)
 """of a factor: the first part of a valve that jumps open is some hundred times as steep
 as the last"""
-CURVE_SD = 0.4
+CURVE_SD = 0.3
 """scatter of the logarithm of neighbouring factors that one expects (ours)"""
 GROUP = "group"
 """what `per` says of a parameter that has an effect in each group"""

@@ -492,8 +492,6 @@ class Ladder:
             far = start.name not in self.refinements
             far |= bool(_new_curves(problem, last))
             theta = _begun(problem, last, start.theta)
-            renewed = _renewed(problem, last, theta)
-            theta = self._each_alone(problem, renewed, theta, settings, step)
         if problem.settings.rung is not last.settings.rung:
             if self._is_white():
                 return None
@@ -502,27 +500,6 @@ class Ladder:
             if problem.rms(problem.output_errors(theta[None]))[0] > start.rms:
                 return None
         return _Beginning(theta, far)
-
-    def _each_alone(
-        self,
-        problem: Problem,
-        joints: Sequence[int],
-        theta: Array,
-        settings: RefinementSettings,
-        step: Step,
-    ) -> Array:
-        """Return what some joints, each alone, lead to from theta, (P,).
-
-        A joint whose errors are large weighs little beside the others, and together
-        with them least squares ends before it has moved.
-        """
-        for joint in joints:
-            own = alone(problem, joint, theta)
-            lone_step = step.changed(joint=joint, phase="at first")
-            end = self._refined(make_likelihood(own), theta, settings, lone_step)
-            reached = own.parameters.from_unit(end.point)
-            theta = np.where(problem.parameters.free, reached, theta)
-        return theta
 
     def _nearer(
         self,
@@ -890,21 +867,6 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     for joint in _new_curves(problem, last):
         begun = by_speeds(problem, joint, begun)
     return begun
-
-
-def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
-    """Return the joints, from 1, that begin alone: all that is new in the model is of
-    single joints, and of these.
-
-    None where joints share a pump.
-    """
-    new = {*problem.settings.parameters} - {*last.settings.parameters}
-    own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
-    if share_pump(problem, theta):
-        return []
-    if new != set[str]().union(*own.values()):
-        return []
-    return [joint for joint, names in own.items() if names]
 
 
 def _new_curves(problem: Problem, last: Problem) -> list[int]:

@@ -670,9 +670,10 @@ class Ladder:
                 self._note_alone(term, gained)
             if is_clear(*gained, among):
                 found = _Alone(tried.terms, own.parameters.from_unit(end_with.point))
-                return self._fewer(
-                    whole, own, found, left_out_with, terms, tried, settings
-                )
+                if len(terms) == 1:
+                    return found
+                compared = left_out, left_out_with
+                return self._fewer(whole, own, found, compared, tried, settings, among)
         return _Alone(kept, before.parameters.from_unit(end.point))
 
     def _fewer(
@@ -680,18 +681,23 @@ class Ladder:
         whole: Problem,
         problem: Problem,
         found: "_Alone",
-        left_out: LeftOut,
-        new: Sequence[str],
+        compared: tuple[LeftOut, LeftOut],
         step: Step,
         settings: RefinementSettings,
+        among: int,
     ) -> "_Alone":
-        """Drop each of several new terms of a joint alone that its model, with these
-        predictions of parts left out, predicts as well without."""
-        for term in new:
-            terms = tuple(one for one in found.terms if one != term)
-            if self._late or len(new) == 1:
+        """Drop terms of a joint alone that its model predicts as well without, as long
+        as the rest is still clearly better than none of them.
+
+        `compared` are the predictions of parts left out without any of them, and with
+        all.
+        """
+        none, left_out = compared
+        had = none.problem.settings.terms()
+        for term in [one for one in found.terms if one not in had]:
+            if self._late:
                 break
-            fewer = step.changed(terms=terms)
+            fewer = step.changed(terms=tuple(one for one in found.terms if one != term))
             less = whole.varied(whole.settings.of_estimate(fewer.estimate))
             started = less.parameters.started(problem.parameters.mapping(found.theta))
             own = alone(less, step.joint, started)
@@ -699,11 +705,10 @@ class Ladder:
             without = self._left_out_of(own, end)
             gained = gain(left_out, without)
             self._note_alone(term, gained)
-            if is_clear(*gained):
-                continue
-            found = _Alone(terms, own.parameters.from_unit(end.point))
-            problem = own
-            left_out = without
+            if not is_clear(*gained) and is_clear(*gain(without, none), among):
+                found = _Alone(fewer.terms, own.parameters.from_unit(end.point))
+                problem = own
+                left_out = without
         return found
 
     def _ends_with(

@@ -153,8 +153,8 @@ def test_no_joint_that_a_load_slows_takes_it(tmp_path):
     found = fit(problem.varied(problem.settings.changed(late)))
     assert found.final == "refined"
     for gained in found.tried.values():
-        assert gained is not None
-        assert gained[0] < 0
+        # where it errs much more it is not even refined
+        assert gained is None or gained[0] < 0
 
 
 class Hurried(Silent):

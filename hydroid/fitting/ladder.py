@@ -8,7 +8,8 @@ is shows long before least squares has converged, so that ends early on the way
 after least squares has also tried it from elsewhere (`Ladder._begin_anew`).
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, Protocol
 
@@ -201,7 +202,7 @@ class Ladder:
     def _climb_first(
         self,
         whole: Problem,
-        lone: Mapping[str, int],
+        lone: Mapping[int, Sequence[str]],
         settings: RefinementSettings,
         *,
         alone_first: bool,
@@ -237,11 +238,11 @@ class Ladder:
         self,
         whole: Problem,
         rung: Rung,
-        lone: Collection[str],
+        lone: Mapping[int, Sequence[str]],
         settings: RefinementSettings,
     ) -> None:
         """Refine on a further rung, if it is better, and then with each of its terms
-        besides; those of `lone` are another method's."""
+        besides; those of one joint, of `lone`, are another method's."""
         possible = whole.settings.terms(rung)
         terms = tuple(term for term in possible if term in self._step.terms)
         self._rung(whole, Step(rung.name, terms), settings, if_better=True)
@@ -252,12 +253,14 @@ class Ladder:
         self,
         whole: Problem,
         rung: Rung,
-        lone: Collection[str],
+        lone: Mapping[int, Sequence[str]],
         settings: RefinementSettings,
     ) -> None:
-        """Try each term that the kept model lacks on a rung, besides those of `lone`."""
+        """Try each term that the kept model lacks on a rung, besides those of one joint
+        of `lone`."""
+        of_joints = Counter(term for terms in lone.values() for term in terms)
         for term in whole.settings.terms(rung):
-            if term not in self._step.terms and term not in lone:
+            if term not in self._step.terms and of_joints[term] != 1:
                 with_term = self._step.changed(terms=(*self._step.terms, term))
                 self._rung(whole, with_term, settings, if_better=True)
 
@@ -492,6 +495,8 @@ class Ladder:
             far = start.name not in self.refinements
             far |= bool(_new_curves(problem, last))
             theta = _begun(problem, last, start.theta)
+            renewed = _renewed(problem, last, theta)
+            theta = self._each_alone(problem, renewed, theta, settings, step)
         if problem.settings.rung is not last.settings.rung:
             if self._is_white():
                 return None
@@ -500,6 +505,27 @@ class Ladder:
             if problem.rms(problem.output_errors(theta[None]))[0] > start.rms:
                 return None
         return _Beginning(theta, far)
+
+    def _each_alone(
+        self,
+        problem: Problem,
+        joints: Sequence[int],
+        theta: Array,
+        settings: RefinementSettings,
+        step: Step,
+    ) -> Array:
+        """Return what some joints, each alone, lead to from theta, (P,).
+
+        A joint whose errors are large weighs little beside the others, and together
+        with them least squares ends before it has moved.
+        """
+        for joint in joints:
+            own = alone(problem, joint, theta)
+            lone_step = step.changed(joint=joint, phase="at first")
+            end = self._refined(make_likelihood(own), theta, settings, lone_step)
+            reached = own.parameters.from_unit(end.point)
+            theta = np.where(problem.parameters.free, reached, theta)
+        return theta
 
     def _nearer(
         self,
@@ -534,51 +560,53 @@ class Ladder:
                 break
         return parameters.from_unit(min(ends, key=lambda end: end.negative_log).point)
 
-    def _lone_terms(self, settings: FitSettings) -> dict[str, int]:
-        """Return the terms of one joint that can be fitted alone, and that joint,
-        numbered from 1."""
-        return {
-            term: joint
-            for joint in lone_joints(self.problem)
-            for term in settings.terms_of(joint)
-        }
+    def _lone_terms(self, settings: FitSettings) -> dict[int, tuple[str, ...]]:
+        """Return the terms that can be fitted on each joint alone, by joint, numbered
+        from 1; a term of each joint, as the oil, is among those of all."""
+        joints = lone_joints(self.problem)
+        terms = {joint: settings.terms_of(joint) for joint in joints}
+        return {joint: own for joint, own in terms.items() if own}
 
     def _add_lone_terms(
-        self, whole: Problem, lone: Mapping[str, int], settings: RefinementSettings
+        self,
+        whole: Problem,
+        lone: Mapping[int, Sequence[str]],
+        settings: RefinementSettings,
     ) -> None:
         """Try the terms of each joint on that joint alone, which takes seconds; then
         the better ones of all joints together.
 
-        The other joints follow their logs meanwhile.
+        The other joints follow their logs meanwhile. A term of each joint that one of
+        them needs is added to all.
         """
         problem = self.problem
         theta = self.kept.theta
         step = self._step
-        joints = tuple(dict.fromkeys(lone.values()))
-        for joint in joints:
-            lacking = [
-                term
-                for term, owner in lone.items()
-                if owner == joint and term not in step.terms
-            ]
+        before = list[int]()
+        for joint, terms in lone.items():
+            lacking = [term for term in terms if term not in step.terms]
             promising = self._promising(whole, problem, theta, step, joint, lacking)
             if self._late:
                 break
             for term in lacking:
                 if term not in promising:
                     self._note_alone(term, None)
-            if not promising:
-                continue
-            tried = step.changed(terms=(*step.terms, *promising), joint=joint)
-            found = self._alone(whole, problem, theta, tried, settings, len(joints))
-            if self._late:
-                break
-            if found.terms == step.terms:
-                theta = likelier(problem, theta, found.theta)
-                continue
-            step = step.changed(terms=found.terms)
-            problem = whole.varied(whole.settings.of_estimate(step.estimate))
-            theta = found.theta
+            if promising:
+                tried = step.changed(terms=(*step.terms, *promising), joint=joint)
+                found = self._alone(whole, problem, theta, tried, settings, len(lone))
+                if self._late:
+                    break
+                if found.terms == step.terms:
+                    theta = likelier(problem, theta, found.theta)
+                else:
+                    shared = {*found.terms} - {*step.terms}
+                    step = step.changed(terms=found.terms)
+                    problem = whole.varied(whole.settings.of_estimate(step.estimate))
+                    behind = [j for j in before if shared.intersection(lone[j])]
+                    theta = self._each_alone(
+                        problem, behind, found.theta, settings, step
+                    )
+            before.append(joint)
         if self.kept.name not in self.refinements:
             self._rung(whole, step, settings, if_better=False, begun=theta)
         elif step != self._step:
@@ -872,6 +900,21 @@ def _begun(problem: Problem, last: Problem, theta: Array) -> Array:
     for joint in _new_curves(problem, last):
         begun = by_speeds(problem, joint, begun)
     return begun
+
+
+def _renewed(problem: Problem, last: Problem, theta: Array) -> list[int]:
+    """Return the joints, from 1, that begin alone: all that is new in the model is of
+    single joints, and of these.
+
+    None where joints share a pump.
+    """
+    new = {*problem.settings.parameters} - {*last.settings.parameters}
+    own = {j: new & problem.settings.acting_on(j) for j in lone_joints(problem)}
+    if share_pump(problem, theta):
+        return []
+    if new != set[str]().union(*own.values()):
+        return []
+    return [joint for joint, names in own.items() if names]
 
 
 def _new_curves(problem: Problem, last: Problem) -> list[int]:

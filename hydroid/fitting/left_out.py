@@ -18,7 +18,11 @@ from hydroid.arrays import Array, Ints, record
 from hydroid.estimate import finite
 from hydroid.fitting.refinement import Refinement, refine_from_afar
 from hydroid.fitting.step import Step
-from hydroid.posterior.error_model import Likelihood, make_likelihood
+from hydroid.posterior.error_model import (
+    LEAST_NOISE,
+    Likelihood,
+    make_likelihood,
+)
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import derivatives
 from hydroid.settings.search import RefinementSettings
@@ -205,13 +209,13 @@ def _gains(likelihood: Likelihood, errors: Array, own: Array) -> Array:
     out, which leaves logarithms of sums of squares (A. Zellner, *An Introduction to
     Bayesian Inference in Econometrics*, 1971, chapter 3). A block
     counts for as many errors as tell as much as its own, (R,), which last; no sum is
-    below what the sensor's noise leaves.
+    below what a sensor's least noise leaves.
     """
     number = blocks(likelihood.problem)
     weighing = likelihood.errors
     squares = weighing.innovations(np.vstack([errors, own])) ** 2
     gains = np.zeros(int(number.max()) + 1)
-    for i in range(len(weighing.signals)):
+    for i, signal in enumerate(weighing.signals):
         of_signal = np.zeros(number.size, dtype=bool)
         for course in weighing.courses_of(i):
             of_signal[course.rows] = course.used
@@ -221,9 +225,9 @@ def _gains(likelihood: Likelihood, errors: Array, own: Array) -> Array:
             np.bincount(inside, row[of_signal], len(gains)) for row in squares[:2]
         )
         counted = float(np.mean(squares[2, of_signal])) * count
-        sensor = likelihood.shown.numbers[i, 0] / weighing.numbers[i, 0] * count
+        least = LEAST_NOISE[signal.quantity] ** 2 / weighing.numbers[i, 0] * count
         known = count > 0
-        ratio = (before + sensor)[known] / (after + sensor)[known]
+        ratio = (before + least)[known] / (after + least)[known]
         gains[known] += 0.5 * counted[known] * np.log(ratio)
     return gains
 

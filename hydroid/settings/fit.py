@@ -243,12 +243,17 @@ class FitSettings(Settings):
         return tuple(dict.fromkeys(names))
 
     def terms_of(self, joint: int) -> tuple[str, ...]:
-        """Names of the terms whose parameters all act on one joint, numbered from 1."""
+        """Names of the terms whose parameters act on one joint each, numbered from 1,
+        and some of them on this one: what the joint has of them can be fitted alone."""
         owners = dict[str, set[tuple[int, ...] | None]]()
         for parameter in self.parameters.values():
             if parameter.term is not None and parameter.quantity != BY_COMMAND:
                 owners.setdefault(parameter.term, set()).add(parameter.joints)
-        return tuple(term for term, joints in owners.items() if joints == {(joint,)})
+        return tuple(
+            term
+            for term, joints in owners.items()
+            if (joint,) in joints and all(one and len(one) == 1 for one in joints)
+        )
 
     def bends(self, term: str) -> bool:
         """Return whether a term frees the curve of a valve."""

@@ -125,24 +125,35 @@ def test_a_term_that_is_not_there_gains_nothing_that_is_certain(fits: int, most:
     assert named <= most
 
 
-def test_the_gain_is_that_of_the_weighed_squares_and_its_error_that_of_the_blocks():
+def white(problem: Problem, scale: Array) -> LeftOut:
+    """Return predictions with white errors of a standard deviation at each sample
+    [rad], (R,)."""
+    noise = np.random.default_rng(0).normal(size=problem.measured.size)
+    return not_fitted(problem, problem.parameters.start, scale * noise)
+
+
+def test_the_gain_is_the_logarithm_of_the_scales_of_errors_by_blocks():
     problem = Problem(ONE, [log_of(seed) for seed in range(3)])
-    rng = np.random.default_rng(0)
-    theta = problem.parameters.start
-    before, after = (
-        not_fitted(problem, theta, rng.normal(0.0, sd, problem.measured.size))
-        for sd in (0.01, 0.007)
-    )
-    levels = np.zeros(blocks(problem).max() + 1)
-    for one in (before, after):
-        weighing = make_likelihood(problem).estimated(one.errors).errors
-        squares = weighing.innovations(np.stack([before.errors, after.errors])) ** 2
-        levels += 0.5 * np.bincount(blocks(problem), 0.5 * (squares[0] - squares[1]))
+    samples = problem.measured.size
+    ones = np.ones(samples)
+    before, after = (white(problem, sd * ones) for sd in (0.01, 0.007))
     rise, error = gain(after, before)
     assert gain(before, after) == pytest.approx((-rise, error))
-    assert rise == pytest.approx(levels.sum())
-    assert rise > 0
-    assert error == pytest.approx(np.sqrt(len(levels)) * np.std(levels, ddof=1))
+    # of white errors each sample counts as one
+    assert rise == pytest.approx(samples * np.log(0.01 / 0.007), rel=0.05)
+    assert error < 0.2 * rise
+
+
+def test_one_block_that_errs_much_counts_by_the_logarithm_of_that():
+    problem = Problem(ONE, [log_of(seed) for seed in range(3)])
+    number = blocks(problem)
+    wrong = np.where(number == 1, 10.0, 1.0)
+    # it predicts all blocks better, but one so much worse that squares say the contrary
+    before = white(problem, 0.01 * np.ones(number.size))
+    after = white(problem, 0.005 * wrong)
+    worse = np.log(5.0) * np.sum(number == 1)
+    better = np.log(2.0) * np.sum(number != 1)
+    assert gain(after, before)[0] == pytest.approx(better - worse, rel=0.3)
 
 
 def test_what_diverges_is_worse_and_one_that_does_not_is_better():

@@ -579,6 +579,9 @@ class Ladder:
         The other joints follow their logs meanwhile. A term of each joint that one of
         them needs is added to all.
         """
+        refined = self.kept.name in self.refinements
+        if refined and self._is_at_end():
+            return
         problem = self.problem
         theta = self.kept.theta
         step = self._step
@@ -607,7 +610,7 @@ class Ladder:
                         problem, behind, found.theta, settings, step
                     )
             before.append(joint)
-        if self.kept.name not in self.refinements:
+        if not refined:
             self._rung(whole, step, settings, if_better=False, begun=theta)
         elif step != self._step:
             self._rung(whole, step, settings, if_better=True, begun=theta)

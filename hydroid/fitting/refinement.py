@@ -127,7 +127,7 @@ def refine_from_afar(
         return refine(likelihood, theta, settings, progress, checkpoints, what)
     rough = settings.changed({"gain_tolerance": max(settings.gain_tolerance, ROUGH)})
     afar = what.changed(phase="from afar")
-    output_errors = likelihood.of_independent_errors
+    output_errors = likelihood.of_output_errors
     first = refine(output_errors, theta, rough, progress, checkpoints, afar)
     if first.ending is Ending.TIME:
         return first

@@ -89,7 +89,7 @@ def test_each_side_of_a_valve_starts_where_the_logs_show_it(place: Path):
         assert (a, b) == pytest.approx((20, 30), abs=5), joint
         assert settings.priors[f"dead_{joint}"].tails == "heavy"
         assert settings.priors[f"curve_A_{joint}"].smooth is not None
-        assert settings.terms_of(settings.outputs[0]) == ("curve_swing",)
+        assert settings.terms_of(settings.outputs[0]) == ("curve_swing", "oil")
 
 
 @pytest.mark.usefixtures("short_searches")

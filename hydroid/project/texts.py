@@ -185,7 +185,8 @@ def _sides(
     sides = list[ValveSide]()
     for name, start in zip("AB", valve.sides, strict=True):
         opening = _opening(joint, start.speed, usual)
-        band = short(min(start.dead_band, MOST_DEAD))
+        # a search ends beside 0, not at it
+        band = short(round(min(start.dead_band, MOST_DEAD), 2))
         sides.append(
             ValveSide(name, opening, band, short(start.exponent), start.one_size)
         )

@@ -219,6 +219,8 @@ def _gains(likelihood: Likelihood, errors: Array, own: Array) -> Array:
         of_signal = np.zeros(number.size, dtype=bool)
         for course in weighing.courses_of(i):
             of_signal[course.rows] = course.used
+        if not of_signal.any():
+            continue
         inside = number[of_signal]
         count = np.bincount(inside, minlength=len(gains))
         before, after = (

@@ -57,6 +57,8 @@ ANEW = 3
 """number of the start from which the kept estimate is refined again"""
 JOINTS_ANEW = 4
 """number of the start with joints that began alone elsewhere"""
+JOINTS_FIRST = 7
+"""number of the start with terms that joints alone have asked for"""
 PUMP_ANEW = 5
 """number of the start with a pump on open centres"""
 AS_IT_IS = 6
@@ -372,6 +374,8 @@ class Ladder:
                 continue
             near = after.parameters.from_unit(far.point)
             end = self._refined(make_likelihood(after), near, settings, tried)
+            if self._late:
+                return
             gained = gain(
                 self._left_out_of(after, end), self._left_out_of(before, as_it_is)
             )
@@ -581,11 +585,16 @@ class Ladder:
         """
         refined = self.kept.name in self.refinements
         if refined and self._is_at_end():
+            for terms in lone.values():
+                for term in terms:
+                    if not self._late and term not in self._step.terms:
+                        self._note_alone(term, None)
             return
         problem = self.problem
         theta = self.kept.theta
         step = self._step
-        before = list[int]()
+        # with which each joint has been fitted alone
+        fitted_with = dict[int, set[str]]()
         for joint, terms in lone.items():
             lacking = [term for term in terms if term not in step.terms]
             promising = self._promising(whole, problem, theta, step, joint, lacking)
@@ -599,21 +608,29 @@ class Ladder:
                 found = self._alone(whole, problem, theta, tried, settings, len(lone))
                 if self._late:
                     break
+                fitted_with[joint] = {*found.terms}
                 if found.terms == step.terms:
                     theta = likelier(problem, theta, found.theta)
                 else:
-                    shared = {*found.terms} - {*step.terms}
                     step = step.changed(terms=found.terms)
                     problem = whole.varied(whole.settings.of_estimate(step.estimate))
-                    behind = [j for j in before if shared.intersection(lone[j])]
-                    theta = self._each_alone(
-                        problem, behind, found.theta, settings, step
-                    )
-            before.append(joint)
+                    theta = found.theta
+        # the checkpoints of what is begun alone are not those of a later trial
+        alone_first = step.changed(start=JOINTS_FIRST)
+        new = {*step.terms} - {*self._step.terms}
+        behind = [
+            joint
+            for joint, terms in lone.items()
+            if new.intersection(terms) - fitted_with.get(joint, set())
+        ]
+        if not self._late:
+            theta = self._each_alone(problem, behind, theta, settings, alone_first)
         if not refined:
             self._rung(whole, step, settings, if_better=False, begun=theta)
         elif step != self._step:
-            self._rung(whole, step, settings, if_better=True, begun=theta)
+            self._rung(whole, alone_first, settings, if_better=True, begun=theta)
+            if self._step == alone_first:
+                self._step = step
         elif theta is not self.kept.theta:
             # a joint went on alone from where all together had ended
             again = step.changed(start=2)
@@ -638,7 +655,8 @@ class Ladder:
             return ()
         values = last.parameters.mapping(theta)
         others = [term for term in lacking if not whole.settings.bends(term)]
-        for terms, least in ((lacking, BENDS), (others, LESS)):
+        least_of_all = LESS if len(others) == len(lacking) else BENDS
+        for terms, least in ((lacking, least_of_all), (others, LESS)):
             with_them = step.changed(terms=(*step.terms, *terms))
             problem = whole.varied(whole.settings.of_estimate(with_them.estimate))
             started = problem.parameters.started(values)
@@ -804,7 +822,8 @@ class Ladder:
     def _note_alone(self, term: str, gained: tuple[float, float] | None) -> None:
         """Note what a term gained on its joint alone, unless all joints together have
         decided on it."""
-        if term not in self._dropped:
+        is_news = gained is not None or self.tried.get(term) is None
+        if term not in self._dropped and is_news:
             self.tried[term] = gained
 
     def _note_dropped(self, term: str, gained: tuple[float, float]) -> None:

@@ -207,12 +207,13 @@ def _gains(likelihood: Likelihood, errors: Array, own: Array) -> Array:
     that it does not know, a block may err ten times as much, and would alone decide.
     So the errors of a signal have a scale of their own in each block. It is integrated
     out, which leaves logarithms of sums of squares (A. Zellner, *An Introduction to
-    Bayesian Inference in Econometrics*, 1971, chapter 3). A block
-    counts for as many errors as tell as much as its own, (R,), which last; no sum is
-    below what a sensor's least noise leaves.
+    Bayesian Inference in Econometrics*, 1971, chapter 3). A block counts as the number
+    of independent errors that tell as much as the errors `own`, (R,), which last. No
+    sum is below what a sensor's least noise leaves.
     """
     number = blocks(likelihood.problem)
-    weighing = likelihood.errors
+    # each signal by its own errors, in stage 1, too
+    weighing = likelihood.shown.weighing(likelihood.memory, alike=False)
     squares = weighing.innovations(np.vstack([errors, own])) ** 2
     gains = np.zeros(int(number.max()) + 1)
     for i, signal in enumerate(weighing.signals):

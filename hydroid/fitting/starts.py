@@ -96,7 +96,8 @@ def valve_alone(
     if shown is anew:
         ends = [*problem.settings.arm.ranges.values()][joint - 1]
         simple = fit_baselines(problem.logs, joint, ends)
-        shown = by_numbers(problem, joint, anew, simple[NAMES[-1]])
+        if NAMES[-1] in simple:
+            shown = by_numbers(problem, joint, anew, simple[NAMES[-1]])
     return _with_valve(problem, joint, kept, {}, speeds), shown
 
 

@@ -616,7 +616,7 @@ class Ladder:
                     problem = whole.varied(whole.settings.of_estimate(step.estimate))
                     theta = found.theta
         # the checkpoints of what is begun alone are not those of a later trial
-        alone_first = step.changed(start=JOINTS_FIRST)
+        begun_alone = step.changed(start=JOINTS_FIRST)
         new = {*step.terms} - {*self._step.terms}
         behind = [
             joint
@@ -624,12 +624,12 @@ class Ladder:
             if new.intersection(terms) - fitted_with.get(joint, set())
         ]
         if not self._late:
-            theta = self._each_alone(problem, behind, theta, settings, alone_first)
+            theta = self._each_alone(problem, behind, theta, settings, begun_alone)
         if not refined:
             self._rung(whole, step, settings, if_better=False, begun=theta)
         elif step != self._step:
-            self._rung(whole, alone_first, settings, if_better=True, begun=theta)
-            if self._step == alone_first:
+            self._rung(whole, begun_alone, settings, if_better=True, begun=theta)
+            if self._step == begun_alone:
                 self._step = step
         elif theta is not self.kept.theta:
             # a joint went on alone from where all together had ended

@@ -190,8 +190,7 @@ class Ladder:
         for rung in further:
             self._climb_model(whole, rung, lone, on_the_way)
         if self._step.model in {rung.name for rung in further}:
-            for term in self._step.terms:
-                self._try_without(whole, term, on_the_way)
+            self._try_each_without(whole, self._step.terms, on_the_way)
         if anew:
             self._begin_joints_anew(on_the_way)
             self._begin_anew(on_the_way)
@@ -229,8 +228,7 @@ class Ladder:
         self._add_terms(whole, rung, lone, settings)
         if self._step.terms == of_joints:
             return
-        for term in of_joints:
-            self._try_without(whole, term, settings)
+        self._try_each_without(whole, of_joints, settings)
         with_shared = self._step.terms
         self._add_lone_terms(whole, lone, settings)
         if self._step.terms != with_shared:
@@ -348,44 +346,62 @@ class Ladder:
                     erring[term] = joint
         for term, joint in erring.items():
             tried = step.changed(terms=(*step.terms, term), joint=joint)
-            own = whole.varied(whole.settings.of_estimate(tried.estimate))
-            starts = valve_alone(own, joint, problem, theta)
-            before = _of_joint(problem, joint, theta)
-            after = _of_joint(own, joint, starts[0])
-            as_it_is = self._refined(
-                make_likelihood(before),
-                theta,
-                settings,
-                step.changed(joint=joint, start=AS_IT_IS),
+            found = self._by_command(
+                whole, problem, theta, tried, settings, len(erring)
             )
-            ends = [
-                self._far_end(after, start, settings, tried.changed(start=number))
-                for number, start in enumerate(starts, 1)
-            ]
-            far = min(ends, key=lambda one: one.negative_log)
-            # it has fewer parameters, but where it errs much more it predicts worse
-            reached = before.parameters.from_unit(as_it_is.point)
-            independent = make_likelihood(before).of_independent_errors
-            enough = independent.negative_log_at(reached)
-            enough += LESS * before.measured.size
             if self._late:
                 return
-            if far.negative_log > enough:
-                continue
-            near = after.parameters.from_unit(far.point)
-            end = self._refined(make_likelihood(after), near, settings, tried)
-            if self._late:
-                return
-            gained = gain(
-                self._left_out_of(after, end), self._left_out_of(before, as_it_is)
-            )
-            self._note_alone(term, gained)
-            if is_clear(*gained, len(erring)):
-                problem = own
-                theta = after.parameters.from_unit(end.point)
-                step = tried.changed(joint=0)
+            if found is not None:
+                step = step.changed(terms=found.terms)
+                problem = whole.varied(whole.settings.of_estimate(step.estimate))
+                theta = found.theta
         if step != self._step:
             self._rung(whole, step, settings, if_better=True, begun=theta)
+
+    def _by_command(
+        self,
+        whole: Problem,
+        last: Problem,
+        theta: Array,
+        step: Step,
+        settings: RefinementSettings,
+        among: int,
+    ) -> "_Alone | None":
+        """Refine a joint alone as it is at theta of the last problem, (P,), and by its
+        command, by the last term of a step; None where that is not clearly better, of
+        `among` joints, or there was no time."""
+        own = whole.varied(whole.settings.of_estimate(step.estimate))
+        starts = valve_alone(own, step.joint, last, theta)
+        before = _of_joint(last, step.joint, theta)
+        after = _of_joint(own, step.joint, starts[0])
+        as_it_is = self._refined(
+            make_likelihood(before),
+            theta,
+            settings,
+            step.changed(terms=step.terms[:-1], start=AS_IT_IS),
+        )
+        ends = [
+            self._far_end(after, start, settings, step.changed(start=number))
+            for number, start in enumerate(starts, 1)
+        ]
+        far = min(ends, key=lambda one: one.negative_log)
+        # it has fewer parameters, but where it errs much more it predicts worse
+        reached = before.parameters.from_unit(as_it_is.point)
+        independent = make_likelihood(before).of_independent_errors
+        enough = independent.negative_log_at(reached) + LESS * before.measured.size
+        if self._late or far.negative_log > enough:
+            return None
+        near = after.parameters.from_unit(far.point)
+        end = self._refined(make_likelihood(after), near, settings, step)
+        if self._late:
+            return None
+        gained = gain(
+            self._left_out_of(after, end), self._left_out_of(before, as_it_is)
+        )
+        self._note_alone(step.terms[-1], gained)
+        if not is_clear(*gained, among):
+            return None
+        return _Alone(step.terms, after.parameters.from_unit(end.point))
 
     def _keep_likelier(self, end: Refinement) -> None:
         """Keep another end of the kept model's least squares where it is likelier, by
@@ -585,45 +601,23 @@ class Ladder:
         """
         refined = self.kept.name in self.refinements
         if refined and self._is_at_end():
-            for terms in lone.values():
-                for term in terms:
-                    if not self._late and term not in self._step.terms:
-                        self._note_alone(term, None)
+            if not self._late:
+                for terms in lone.values():
+                    self._note_each(self._lacking(terms, self._step), None)
             return
-        problem = self.problem
-        theta = self.kept.theta
-        step = self._step
-        # with which each joint has been fitted alone
-        fitted_with = dict[int, set[str]]()
-        for joint, terms in lone.items():
-            lacking = [term for term in terms if term not in step.terms]
-            promising = self._promising(whole, problem, theta, step, joint, lacking)
-            if self._late:
-                break
-            for term in lacking:
-                if term not in promising:
-                    self._note_alone(term, None)
-            if promising:
-                tried = step.changed(terms=(*step.terms, *promising), joint=joint)
-                found = self._alone(whole, problem, theta, tried, settings, len(lone))
-                if self._late:
-                    break
-                fitted_with[joint] = {*found.terms}
-                if found.terms == step.terms:
-                    theta = likelier(problem, theta, found.theta)
-                else:
-                    step = step.changed(terms=found.terms)
-                    problem = whole.varied(whole.settings.of_estimate(step.estimate))
-                    theta = found.theta
+        found, fitted_with = self._joint_by_joint(whole, lone, settings)
+        theta = found.theta
+        step = self._step.changed(terms=found.terms)
         # the checkpoints of what is begun alone are not those of a later trial
         begun_alone = step.changed(start=JOINTS_FIRST)
-        new = {*step.terms} - {*self._step.terms}
-        behind = [
-            joint
-            for joint, terms in lone.items()
-            if new.intersection(terms) - fitted_with.get(joint, set())
-        ]
-        if not self._late:
+        if step != self._step and not self._late:
+            new = {*step.terms} - {*self._step.terms}
+            behind = [
+                joint
+                for joint, terms in lone.items()
+                if new.intersection(terms) - fitted_with.get(joint, set())
+            ]
+            problem = whole.varied(whole.settings.of_estimate(step.estimate))
             theta = self._each_alone(problem, behind, theta, settings, begun_alone)
         if not refined:
             self._rung(whole, step, settings, if_better=False, begun=theta)
@@ -636,6 +630,45 @@ class Ladder:
             again = step.changed(start=2)
             self._rung(whole, again, settings, if_better=False, begun=theta)
             self._step = step
+
+    def _joint_by_joint(
+        self,
+        whole: Problem,
+        lone: Mapping[int, Sequence[str]],
+        settings: RefinementSettings,
+    ) -> tuple["_Alone", dict[int, set[str]]]:
+        """Try the terms of each joint on that joint alone.
+
+        Returned is where that leads, and with which terms each joint has been fitted.
+        """
+        problem = self.problem
+        theta = self.kept.theta
+        step = self._step
+        fitted_with = dict[int, set[str]]()
+        for joint, terms in lone.items():
+            lacking = self._lacking(terms, step)
+            promising = self._promising(whole, problem, theta, step, joint, lacking)
+            if self._late:
+                break
+            self._note_each([one for one in lacking if one not in promising], None)
+            if not promising:
+                continue
+            tried = step.changed(terms=(*step.terms, *promising), joint=joint)
+            found = self._alone(whole, problem, theta, tried, settings, len(lone))
+            if self._late:
+                break
+            fitted_with[joint] = {*found.terms}
+            if found.terms == step.terms:
+                theta = likelier(problem, theta, found.theta)
+                continue
+            step = step.changed(terms=found.terms)
+            problem = whole.varied(whole.settings.of_estimate(step.estimate))
+            theta = found.theta
+        return _Alone(step.terms, theta), fitted_with
+
+    def _lacking(self, terms: Sequence[str], step: Step) -> list[str]:
+        """Return the terms that a step does not have."""
+        return [term for term in terms if term not in step.terms]
 
     def _promising(
         self,
@@ -708,15 +741,13 @@ class Ladder:
             )
             if self._late:
                 break
-            for term in terms:
-                self._note_alone(term, None)
+            self._note_each(terms, None)
             if not ends:
                 continue
             end_with = min(ends, key=lambda one: one.negative_log)
             left_out_with = self._left_out_of(own, end_with)
             gained = gain(left_out_with, left_out)
-            for term in terms:
-                self._note_alone(term, gained)
+            self._note_each(terms, gained)
             if is_clear(*gained, among):
                 found = _Alone(tried.terms, own.parameters.from_unit(end_with.point))
                 if len(terms) == 1:
@@ -793,6 +824,13 @@ class Ladder:
                 ends.append(end)
         return own, ends
 
+    def _try_each_without(
+        self, whole: Problem, terms: Sequence[str], settings: RefinementSettings
+    ) -> None:
+        """Try to drop terms, one after the other."""
+        for term in terms:
+            self._try_without(whole, term, settings)
+
     def _try_without(
         self, whole: Problem, term: str, settings: RefinementSettings
     ) -> None:
@@ -825,6 +863,13 @@ class Ladder:
         is_news = gained is not None or self.tried.get(term) is None
         if term not in self._dropped and is_news:
             self.tried[term] = gained
+
+    def _note_each(
+        self, terms: Sequence[str], gained: tuple[float, float] | None
+    ) -> None:
+        """Note of each term what all together gained on their joint alone."""
+        for term in terms:
+            self._note_alone(term, gained)
 
     def _note_dropped(self, term: str, gained: tuple[float, float]) -> None:
         """Note what a term gained of all joints together, which do not keep it."""

@@ -110,7 +110,7 @@ class Progress:
 
 
 class FitProgress(Progress):
-    """Shows the progress of a fit with its settings, as `fitting.ladder.Watcher`.
+    """Shows the progress of a fit with its settings, as `fitting.watcher.Watcher`.
 
     Its time is up `budget` seconds after it was made; None: never.
     """

@@ -9,11 +9,16 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
-from hydroid.fitting.ladder import Estimate, Ladder, Watcher, simulated
+from hydroid.fitting.estimates import Estimate, simulated
+from hydroid.fitting.ladder import Ladder
 from hydroid.fitting.refinement import Refinement
+from hydroid.fitting.refiner import Refiner
 from hydroid.fitting.search import Searched, search
+from hydroid.fitting.tried import Gain
+from hydroid.fitting.watcher import Silent, Watcher
+from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities
-from hydroid.posterior.uncertainty import Uncertainty
+from hydroid.posterior.uncertainty import Uncertainty, uncertainty
 from hydroid.problem.problem import Problem
 from hydroid.search.pareto import average, non_dominated, segment_best, utopia
 
@@ -33,7 +38,7 @@ class Fit:
             fitted alone (0: all together).
         uncertainty: of the final estimate.
         quantities: of the final estimate.
-        tried: what the terms of single joints gained (`Ladder.tried`).
+        tried: what terms of single joints gained (`Tried.gains`).
         seconds: wall-clock time of "search", "refinement" and "uncertainty" [s]; of a
             resumed fit, since it was resumed.
     """
@@ -48,9 +53,7 @@ class Fit:
     uncertainty: Uncertainty
     quantities: Quantities
     seconds: Mapping[str, float]
-    tried: Mapping[str, tuple[float, float] | None] = field(
-        default_factory=dict[str, tuple[float, float] | None]
-    )
+    tried: Mapping[str, Gain | None] = field(default_factory=dict[str, Gain | None])
 
     @property
     def refinement(self) -> Refinement | None:
@@ -61,10 +64,6 @@ class Fit:
     def best(self) -> Estimate:
         """The estimate to use."""
         return self.estimates[self.final]
-
-
-class Silent(Watcher):
-    """Progress that is not shown."""
 
 
 def fit(
@@ -95,14 +94,20 @@ def fit(
     searched = search(first, watch, checkpoints)
     estimates = simulated(first, _candidates(first, searched))
     final = next(iter(estimates))
-    ladder = Ladder(first, estimates, watch, checkpoints)
+    last = first
+    refinements = dict[str, Refinement]()
+    tried = dict[str, Gain | None]()
     times.append(time.perf_counter())
     if settings.refinement is not None:
-        ladder.climb(problem)
+        refiner = Refiner(problem, settings.refinement, watch, checkpoints)
+        ladder = Ladder(first, estimates, refiner)
+        ladder.climb()
         final = ladder.kept.name
+        last = ladder.problem
+        refinements = ladder.refinements
+        tried = ladder.tried.gains
     times.append(time.perf_counter())
-    last = ladder.problem
-    about = ladder.known(estimates[final].theta)
+    about = _known(last, estimates[final].theta, refinements.get(final))
     determined = quantities(last, about)
     seconds = np.diff([*times, time.perf_counter()]).tolist()
     return Fit(
@@ -111,12 +116,12 @@ def fit(
         final,
         _front(searched),
         searched.history,
-        ladder.refinements,
+        refinements,
         searched.ends,
         about,
         determined,
         dict(zip(("search", "refinement", "uncertainty"), seconds, strict=True)),
-        ladder.tried,
+        tried,
     )
 
 
@@ -135,6 +140,19 @@ def _candidates(problem: Problem, searched: Searched) -> dict[str, Array]:
     }
     first = problem.settings.search.compromise
     return {first: candidates[first]} | candidates
+
+
+def _known(problem: Problem, theta: Array, descent: Refinement | None) -> Uncertainty:
+    """Return how well the logs determine theta, (P,), of a search or a refinement."""
+    if descent is None or not len(descent.jacobian):
+        return uncertainty(problem, theta)
+    # what least squares ended with
+    parameters = problem.parameters
+    free = parameters.free
+    scale = estimate_box(parameters, theta).scale[free]
+    change = scale / parameters.width(theta)[free]
+    slopes = descent.jacobian[: problem.measured.size].T * change[:, None]
+    return uncertainty(problem, theta, slopes, descent.numbers)
 
 
 def _front(searched: Searched) -> tuple[Array, Array]:

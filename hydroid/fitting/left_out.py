@@ -9,7 +9,6 @@ would be a lottery: the drift of a joint in one log is one draw.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from scipy.stats import norm as normal
@@ -21,6 +20,7 @@ from hydroid.fitting.step import Step
 from hydroid.posterior.error_model import (
     LEAST_NOISE,
     Likelihood,
+    likelihood_at,
     make_likelihood,
 )
 from hydroid.problem.problem import Problem
@@ -97,7 +97,7 @@ def refit(problem: Problem, theta: Array) -> LeftOut:
 
     Nothing of the fit is shown or stored.
     """
-    return predict_blocks(make_likelihood(problem), compared_fit(problem, theta))
+    return predict_blocks(problem, compared_fit(problem, theta))
 
 
 def compared_fit(problem: Problem, theta: Array) -> Refinement:
@@ -108,7 +108,7 @@ def compared_fit(problem: Problem, theta: Array) -> Refinement:
     return refine_from_afar(likelihood, theta, COMPARED, lambda *_: False, {}, step)
 
 
-def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
+def predict_blocks(problem: Problem, end: Refinement) -> LeftOut:
     """Predict each block of time by the parameters that least squares would find
     without it.
 
@@ -123,9 +123,8 @@ def predict_blocks(likelihood: Likelihood, end: Refinement) -> LeftOut:
     its density has rᵀ S r and log |S| (G. A. F. Seber and A. J. Lee, *Linear Regression
     Analysis*, 2003, chapter 10), and neither needs a matrix of the block's size.
     """
-    problem = likelihood.problem
-    weighing = replace(likelihood, shown=replace(likelihood.shown, numbers=end.numbers))
     theta = problem.parameters.from_unit(end.point)
+    weighing = likelihood_at(problem, theta, end.numbers)
     jacobian = end.jacobian
     if not len(jacobian):
         rows = weighing.rows(theta[None])[0]

@@ -9,9 +9,9 @@ from numpy.random import Generator
 
 from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Arrays, Checkpoints, Memo, saving
-from hydroid.fitting.ladder import Watcher
 from hydroid.fitting.multistart import Multistart
 from hydroid.fitting.step import Step
+from hydroid.fitting.watcher import Watcher
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER
 from hydroid.search.chromosomes import Genes

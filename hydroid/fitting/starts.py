@@ -109,6 +109,22 @@ def has_curve(problem: Problem, joint: int) -> bool:
     return any(quantity.startswith(CURVE) for quantity in own)
 
 
+def new_curves(problem: Problem, last: Problem) -> list[int]:
+    """Return the joints, from 1, whose valves have a curve here and had none in the
+    last model.
+
+    None of a model whose joints have inertia: without that and the oil, the speeds are
+    no better start.
+    """
+    if not problem.settings.rung.at_once:
+        return []
+    return [
+        joint
+        for joint in problem.settings.outputs
+        if has_curve(problem, joint) and not has_curve(last, joint)
+    ]
+
+
 def _sided(name: str, a: float, b: float) -> dict[str, float]:
     """Return values of a quantity by name: of both sides, and their mean for both."""
     return {name: (a + b) / 2, f"{name}_a": a, f"{name}_b": b}

@@ -2,11 +2,30 @@
 its line of progress."""
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import Literal
 
 Phase = Literal["", "from afar", "at first", "on the way"]
 """of a rung: by output errors, to see whether it is likely at all, to see whether it is
 better, or to the end (no words)"""
+
+
+class Start(IntEnum):
+    """Numbers of starts in the names of checkpoints, which stored runs have: a rung is
+    refined from the estimate below it, which has none, and from these."""
+
+    AGAIN = 2
+    """the estimate itself, where joints alone have led on"""
+    ANEW = 3
+    """where independent output errors lead from it"""
+    JOINTS_ANEW = 4
+    """with joints that began alone elsewhere"""
+    PUMP_ANEW = 5
+    """with a pump on open centres"""
+    AS_IT_IS = 6
+    """a joint alone as it is, beside one by its command alone"""
+    JOINTS_FIRST = 7
+    """with terms that joints alone have asked for"""
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from hydroid.estimate import (
     finite_ends,
 )
 from hydroid.findings import Finding
+from hydroid.fitting.estimates import Estimate
 from hydroid.fitting.fit import Fit
-from hydroid.fitting.ladder import Estimate
 from hydroid.parameters import Parameter
 from hydroid.posterior.by_log import ByLog, by_log
 from hydroid.posterior.error_model import ErrorModel

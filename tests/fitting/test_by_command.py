@@ -11,8 +11,9 @@ from two_joints import OPENINGS, PARAMETERS, TRUTH, drive, two_joints
 from hydroid.advice.terms import terms
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
-from hydroid.fitting.fit import Fit, Silent, fit
+from hydroid.fitting.fit import Fit, fit
 from hydroid.fitting.starts import valve_alone
+from hydroid.fitting.watcher import Silent
 from hydroid.plant import Plant
 from hydroid.posterior.bench import make_bench
 from hydroid.prediction import predict

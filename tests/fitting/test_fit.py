@@ -6,9 +6,10 @@ from small_fits import Watcher, study
 from hydroid import load_settings
 from hydroid.errors import RunError, SettingsError
 from hydroid.fitting.checkpoints import Memo
-from hydroid.fitting.fit import Silent, fit
+from hydroid.fitting.fit import fit
 from hydroid.fitting.search import search
 from hydroid.fitting.validation import error_indices
+from hydroid.fitting.watcher import Silent
 from hydroid.problem.problem import Problem
 
 

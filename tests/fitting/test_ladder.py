@@ -7,8 +7,9 @@ from made_logs import noisy, simulate_log, step_log
 from recovery import settings_of
 
 from hydroid.commands.progress import FitProgress
-from hydroid.fitting.fit import Silent, fit
+from hydroid.fitting.fit import fit
 from hydroid.fitting.left_out import is_clear
+from hydroid.fitting.watcher import Silent
 from hydroid.problem.problem import Problem
 from hydroid.search.descent import Ending
 from hydroid.settings.search import MultistartSettings, RefinementSettings

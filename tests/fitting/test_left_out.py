@@ -73,7 +73,7 @@ def test_a_block_is_predicted_as_by_a_fit_without_it():
     likelihood = make_likelihood(problem)
     end = refined(likelihood, truth)
     all_of_it = problem.parameters.from_unit(end.point)
-    found = predict_blocks(likelihood, end)
+    found = predict_blocks(problem, end)
     number = blocks(problem)
     for block in range(number.max() + 1):
         out = number == block
@@ -94,9 +94,9 @@ def test_a_parameter_beside_which_nothing_can_be_simulated_is_held():
     end = refined(likelihood, problem.parameters.vector(FAST, "truth"))
     jacobian = end.jacobian.copy()
     jacobian[3:, 1] = np.nan
-    left_out = predict_blocks(likelihood, replace(end, jacobian=jacobian))
+    left_out = predict_blocks(problem, replace(end, jacobian=jacobian))
     held = np.where(np.arange(3) == 1, 0.0, end.jacobian)
-    expected = predict_blocks(likelihood, replace(end, jacobian=held))
+    expected = predict_blocks(problem, replace(end, jacobian=held))
     np.testing.assert_array_equal(left_out.judged, expected.judged)
     assert np.ptp(left_out.thetas[:, 1]) == 0.0
     assert (np.ptp(left_out.thetas[:, [0, 2]], axis=0) > 0.0).all()

@@ -9,8 +9,8 @@ from recovery import refined
 from small_fits import Watcher, steps_of
 
 from hydroid import load_settings
-from hydroid.fitting.fit import Silent
 from hydroid.fitting.search import search
+from hydroid.fitting.watcher import Silent
 from hydroid.problem.problem import Problem
 
 TRUTH = {

@@ -1,0 +1,89 @@
+"""Joints whose speed follows their commands alone: which of them a fit lets do so."""
+
+from dataclasses import replace
+
+from hydroid.fitting.left_out import gain, is_clear, predict_blocks
+from hydroid.fitting.multistart import alone, lone_joints
+from hydroid.fitting.refiner import Place, Refiner
+from hydroid.fitting.starts import LESS, valve_alone
+from hydroid.fitting.step import Start
+from hydroid.fitting.tried import Tried
+from hydroid.posterior.error_model import make_likelihood
+from hydroid.problem.problem import Problem
+from hydroid.rungs import BY_COMMAND
+
+
+def with_joints_by_command(refiner: Refiner, kept: Place, tried: Tried) -> Place:
+    """Return a place with the terms by which the speed of joints follows their commands
+    alone, where that foretells parts left out better than load and pump.
+
+    Each joint that errs by more than noise is tried alone; `tried` takes what that
+    gained.
+    """
+    if not kept.problem.settings.rung.has(BY_COMMAND):
+        return kept
+    possible = kept.problem.settings.outputs
+    if len(possible) > 1:
+        possible = lone_joints(kept.problem)
+    erring = dict[str, int]()
+    for term, joint in refiner.whole.settings.by_command_terms.items():
+        tried.alone(None, term)
+        if joint in possible:
+            own = _of_joint(kept, joint)
+            if not own.leaves_noise(kept.theta):
+                erring[term] = joint
+    now = kept
+    for term, joint in erring.items():
+        found = _by_command(refiner, now, term, joint)
+        if refiner.late:
+            return kept
+        if found is None:
+            continue
+        gained, place = found
+        tried.alone(gained, term)
+        if is_clear(*gained, among=len(erring)):
+            step = now.step.changed(terms=place.step.terms)
+            now = replace(place, step=step, problem=refiner.problem_of(step))
+    return now
+
+
+def _by_command(
+    refiner: Refiner, now: Place, term: str, joint: int
+) -> tuple[tuple[float, float], Place] | None:
+    """Refine a joint alone as it is, and by its command; return what that gains, and
+    where it leads.
+
+    None: it errs so much more that it cannot predict better, or time is up.
+    """
+    step = now.step.changed(terms=(*now.step.terms, term), joint=joint)
+    problem = refiner.problem_of(step)
+    starts = valve_alone(problem, joint, now.problem, now.theta)
+    before = _of_joint(now, joint)
+    after = _of_joint(Place(step, problem, starts[0]), joint)
+    as_it_is = refiner.on_the_way(
+        before, now.theta, now.step.changed(joint=joint, start=Start.AS_IT_IS)
+    )
+    ends = [
+        refiner.far_end(after, start, step.changed(start=number))
+        for number, start in enumerate(starts, 1)
+    ]
+    far = min(ends, key=lambda one: one.negative_log)
+    # it has fewer parameters, but where it errs much more it predicts worse
+    reached = before.parameters.from_unit(as_it_is.point)
+    independent = make_likelihood(before).of_independent_errors
+    enough = independent.negative_log_at(reached) + LESS * before.measured.size
+    if refiner.late or far.negative_log > enough:
+        return None
+    end = refiner.on_the_way(after, after.parameters.from_unit(far.point), step)
+    if refiner.late:
+        return None
+    gained = gain(predict_blocks(after, end), predict_blocks(before, as_it_is))
+    return gained, Place(step, after, after.parameters.from_unit(end.point))
+
+
+def _of_joint(place: Place, joint: int) -> Problem:
+    """Return the problem of a joint alone at a place: as it is, if it is the only one
+    that is compared."""
+    if place.problem.settings.outputs == (joint,):
+        return place.problem
+    return alone(place.problem, joint, place.theta)

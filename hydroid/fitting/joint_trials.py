@@ -1,0 +1,264 @@
+"""Terms and starts of single joints, tried on each joint alone while the others follow
+their logs: that takes seconds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hydroid.arrays import Array
+from hydroid.fitting.left_out import LeftOut, gain, is_clear, predict_blocks
+from hydroid.fitting.multistart import alone, lone_joints
+from hydroid.fitting.refinement import Refinement, promised
+from hydroid.fitting.refiner import Place, Refiner
+from hydroid.fitting.starts import (
+    LESS,
+    by_speeds,
+    likelier,
+    new_curves,
+    with_other_valve,
+)
+from hydroid.fitting.step import Start, Step
+from hydroid.fitting.tried import Tried
+from hydroid.posterior.error_model import make_likelihood
+from hydroid.problem.problem import Problem
+
+BENDS = 0.3
+"""as LESS, of what a valve's curve promises: it bends to any errors a little"""
+
+
+def each_alone(refiner: Refiner, begun: Place, joints: Sequence[int]) -> Array:
+    """Return what some joints, each alone, lead to from a place, (P,).
+
+    A joint whose errors are large weighs little beside the others, and together with
+    them least squares ends before it has moved.
+    """
+    theta = begun.theta
+    for joint in joints:
+        own = alone(begun.problem, joint, theta)
+        step = begun.step.changed(joint=joint, phase="at first")
+        end = refiner.on_the_way(own, theta, step)
+        reached = own.parameters.from_unit(end.point)
+        theta = np.where(begun.problem.parameters.free, reached, theta)
+    return theta
+
+
+def joints_anew(refiner: Refiner, kept: Place) -> Array:
+    """Return a place's theta, (P,), with each joint that errs by more than noise from
+    elsewhere, where that is much likelier.
+
+    What slows a joint under load may be its valve or its lever, and how late it is a
+    delay or a lag: least squares settles for one and does not leave it, whatever the
+    model gets later. So a joint begins where the settings do, a valve with a curve at
+    the speeds that the logs show, and once more with the other kind of valve.
+    """
+    problem = kept.problem
+    theta = kept.theta
+    for joint in lone_joints(problem):
+        own = alone(problem, joint, theta)
+        if own.leaves_noise(theta):
+            continue
+        begun = np.where(own.parameters.free, problem.parameters.start, theta)
+        starts = (
+            by_speeds(problem, joint, begun),
+            with_other_valve(problem, joint, theta),
+        )
+        for number, start in enumerate(starts, Start.ANEW):
+            if refiner.late:
+                return kept.theta
+            step = kept.step.changed(start=number, joint=joint)
+            end = refiner.anew(own, start, step)
+            reached = own.parameters.from_unit(end.point)
+            theta = likelier(problem, theta, reached)
+    return theta
+
+
+class JointTrials:
+    """Tries terms on each joint alone.
+
+    Args:
+        refiner: of the fit.
+        terms: that can be fitted on each joint alone, by joint, numbered from 1; a term
+            of each joint, as the oil, is among those of all.
+        tried: takes what the terms gained.
+    """
+
+    def __init__(
+        self, refiner: Refiner, terms: Mapping[int, Sequence[str]], tried: Tried
+    ) -> None:
+        self._refiner = refiner
+        self._terms = terms
+        self._tried = tried
+
+    def found(self, kept: Place) -> Place:
+        """Return the place with the terms that joints alone ask for, and where these
+        lead.
+
+        A term of each joint that one of them needs is given to all; those that have
+        been fitted without it are fitted once more.
+        """
+        found, fitted_with = self._joint_by_joint(kept)
+        new = {*found.step.terms} - {*kept.step.terms}
+        if not new or self._refiner.late:
+            return found
+        behind = [
+            joint
+            for joint, terms in self._terms.items()
+            if new.intersection(terms) - fitted_with.get(joint, set())
+        ]
+        # the checkpoints of what is begun alone are not those of a later trial
+        apart = replace(found, step=found.step.changed(start=Start.JOINTS_FIRST))
+        return replace(found, theta=each_alone(self._refiner, apart, behind))
+
+    def _joint_by_joint(self, kept: Place) -> tuple[Place, dict[int, set[str]]]:
+        """Return where the terms of one joint after the other lead, and with which
+        terms each joint has been fitted."""
+        fitted_with = dict[int, set[str]]()
+        now = kept
+        for joint, terms in self._terms.items():
+            lacking = now.lacking(terms)
+            promising = self._promising(now, joint, lacking)
+            if self._refiner.late:
+                break
+            unlikely = [term for term in lacking if term not in promising]
+            self._tried.alone(None, *unlikely)
+            if not promising:
+                continue
+            found = self._alone(now, joint, promising)
+            if self._refiner.late:
+                break
+            fitted_with[joint] = {*found.step.terms}
+            if found.step.terms == now.step.terms:
+                theta = likelier(now.problem, now.theta, found.theta)
+                now = replace(now, theta=theta)
+            else:
+                step = now.step.changed(terms=found.step.terms)
+                now = Place(step, self._refiner.problem_of(step), found.theta)
+        return now, fitted_with
+
+    def _promising(
+        self, now: Place, joint: int, lacking: Sequence[str]
+    ) -> Sequence[str]:
+        """Return which of the terms that a joint lacks may gain anything for it alone.
+
+        That takes a Jacobian or two, and most joints of most machines lack no term.
+        """
+        is_done = not lacking or self._refiner.late
+        if is_done or alone(now.problem, joint, now.theta).leaves_noise(now.theta):
+            return ()
+        bends = self._refiner.whole.settings.bends
+        others = [term for term in lacking if not bends(term)]
+        if others == lacking:
+            return lacking if self._promise(now, joint, lacking) > LESS else ()
+        if self._promise(now, joint, lacking) > BENDS:
+            return lacking
+        if others and self._promise(now, joint, others) > LESS:
+            return others
+        return ()
+
+    def _promise(self, now: Place, joint: int, terms: Sequence[str]) -> float:
+        """Return which part of a joint's squared errors terms promise to explain."""
+        step = now.step.changed(terms=(*now.step.terms, *terms))
+        problem = self._refiner.problem_of(step)
+        started = problem.parameters.started(now.values)
+        new = np.array([name not in now.values for name in problem.settings.parameters])
+        likelihood = make_likelihood(alone(problem, joint, started))
+        return promised(likelihood.of_independent_errors, started, new)
+
+    def _alone(self, now: Place, joint: int, new: Sequence[str]) -> Place:
+        """Refine a joint alone, and with new terms: all of them, and else each.
+
+        What one term explains may show only beside another: what a wrong curve of a
+        valve does is hidden while the joint does not ring. Those that it does as well
+        without are dropped again. All begin where independent output errors lead: else
+        what helped the one would count for the terms. Where these hardly fall with a
+        term, it is not refined any further.
+        """
+        refiner = self._refiner
+        step = now.step.changed(joint=joint)
+        before = alone(now.problem, joint, now.theta)
+        far = refiner.far_end(before, now.theta, step)
+        begun = replace(now, step=step, theta=before.parameters.from_unit(far.point))
+        enough = far.negative_log - LESS * before.measured.size
+        end = refiner.on_the_way(before, begun.theta, step)
+        as_it_is = Place(step, before, before.parameters.from_unit(end.point))
+        without = predict_blocks(before, end)
+        choices = [[*new]]
+        if len(new) > 1:
+            choices += [[term] for term in new]
+        for terms in choices:
+            tried = step.changed(terms=(*step.terms, *terms))
+            own, ends = self._ends_with(begun, tried, enough)
+            if refiner.late:
+                break
+            self._tried.alone(None, *terms)
+            if not ends:
+                continue
+            end = min(ends, key=lambda one: one.negative_log)
+            left_out = predict_blocks(own, end)
+            gained = gain(left_out, without)
+            self._tried.alone(gained, *terms)
+            if self._is_clear(gained):
+                found = Place(tried, own, own.parameters.from_unit(end.point))
+                if len(terms) == 1:
+                    return found
+                return self._fewer(found, terms, without, left_out)
+        return as_it_is
+
+    def _fewer(
+        self, found: Place, terms: Sequence[str], none: LeftOut, every: LeftOut
+    ) -> Place:
+        """Drop terms that the model of a joint alone predicts as well without, as long
+        as the rest is still clearly better than none of them.
+
+        `none` and `every` are its predictions of parts left out without any of them,
+        and with all.
+        """
+        left_out = every
+        for term in terms:
+            if self._refiner.late:
+                break
+            rest = tuple(one for one in found.step.terms if one != term)
+            step = found.step.changed(terms=rest)
+            problem = self._refiner.problem_of(step)
+            started = problem.parameters.started(found.values)
+            own = alone(problem, step.joint, started)
+            end = self._refiner.anew(own, started, step)
+            without = predict_blocks(own, end)
+            gained = gain(left_out, without)
+            self._tried.alone(gained, term)
+            if not is_clear(*gained) and self._is_clear(gain(without, none)):
+                found = Place(step, own, own.parameters.from_unit(end.point))
+                left_out = without
+        return found
+
+    def _ends_with(
+        self, begun: Place, step: Step, enough: float
+    ) -> tuple[Problem, list[Refinement]]:
+        """Return the problem of a joint alone with further terms, and its refinements
+        from where independent output errors lead, if these are less than `enough`.
+
+        A valve's curve also begins at the speeds that the logs show, and all else of
+        the joint where the settings begin: without the curve, load and lags have stood
+        for it. Which of them leads nearer differs from valve to valve, and shows only
+        at the end.
+        """
+        problem = self._refiner.problem_of(step)
+        nothing = problem.parameters.started(begun.values)
+        own = alone(problem, step.joint, nothing)
+        starts = {step: nothing}
+        if new_curves(problem, begun.problem):
+            anew = np.where(own.parameters.free, problem.parameters.start, nothing)
+            starts[step.changed(start=2)] = by_speeds(problem, step.joint, anew)
+        ends = list[Refinement]()
+        for tried, start in starts.items():
+            far = self._refiner.far_end(own, start, tried)
+            if far.negative_log < enough:
+                near = own.parameters.from_unit(far.point)
+                ends.append(self._refiner.on_the_way(own, near, tried))
+        return own, ends
+
+    def _is_clear(self, gained: tuple[float, float]) -> bool:
+        """Return whether a gain is clear: of several joints, some seem better by
+        chance."""
+        return is_clear(*gained, among=len(self._terms))

@@ -147,14 +147,10 @@ class JointTrials:
         if is_done or alone(now.problem, joint, now.theta).leaves_noise(now.theta):
             return ()
         bends = self._refiner.whole.settings.bends
-        others = [term for term in lacking if not bends(term)]
-        if others == lacking:
-            return lacking if self._promise(now, joint, lacking) > LESS else ()
-        if self._promise(now, joint, lacking) > BENDS:
+        # what a bent curve does is no straight line: only a refinement tells
+        if any(map(bends, lacking)):
             return lacking
-        if others and self._promise(now, joint, others) > LESS:
-            return others
-        return ()
+        return lacking if self._promise(now, joint, lacking) > LESS else ()
 
     def _promise(self, now: Place, joint: int, terms: Sequence[str]) -> float:
         """Return which part of a joint's squared errors terms promise to explain."""

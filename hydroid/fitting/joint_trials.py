@@ -23,9 +23,6 @@ from hydroid.fitting.tried import Tried
 from hydroid.posterior.error_model import make_likelihood
 from hydroid.problem.problem import Problem
 
-BENDS = 0.3
-"""as LESS, of what a valve's curve promises: it bends to any errors a little"""
-
 
 def each_alone(refiner: Refiner, begun: Place, joints: Sequence[int]) -> Array:
     """Return what some joints, each alone, lead to from a place, (P,).
@@ -117,16 +114,14 @@ class JointTrials:
         now = kept
         for joint, terms in self._terms.items():
             lacking = now.lacking(terms)
-            promising = self._promising(now, joint, lacking)
+            found = None
+            if self._may_gain(now, joint, lacking):
+                found = self._alone(now, joint, lacking)
             if self._refiner.late:
                 break
-            unlikely = [term for term in lacking if term not in promising]
-            self._tried.alone(None, *unlikely)
-            if not promising:
+            self._tried.alone(None, *lacking)
+            if found is None:
                 continue
-            found = self._alone(now, joint, promising)
-            if self._refiner.late:
-                break
             fitted_with[joint] = {*found.step.terms}
             if found.step.terms == now.step.terms:
                 theta = likelier(now.problem, now.theta, found.theta)
@@ -136,39 +131,33 @@ class JointTrials:
                 now = Place(step, self._refiner.problem_of(step), found.theta)
         return now, fitted_with
 
-    def _promising(
-        self, now: Place, joint: int, lacking: Sequence[str]
-    ) -> Sequence[str]:
-        """Return which of the terms that a joint lacks may gain anything for it alone.
+    def _may_gain(self, now: Place, joint: int, lacking: Sequence[str]) -> bool:
+        """Return whether terms that a joint lacks may gain anything for it alone.
 
-        That takes a Jacobian or two, and most joints of most machines lack no term.
+        Most joints of most machines lack no term. What else than a curve may gain, the
+        linear model tells; a curve that bends is not linear in its numbers.
         """
-        is_done = not lacking or self._refiner.late
-        if is_done or alone(now.problem, joint, now.theta).leaves_noise(now.theta):
-            return ()
-        bends = self._refiner.whole.settings.bends
-        # what a bent curve does is no straight line: only a refinement tells
-        if any(map(bends, lacking)):
-            return lacking
-        return lacking if self._promise(now, joint, lacking) > LESS else ()
-
-    def _promise(self, now: Place, joint: int, terms: Sequence[str]) -> float:
-        """Return which part of a joint's squared errors terms promise to explain."""
-        step = now.step.changed(terms=(*now.step.terms, *terms))
+        if not lacking or self._refiner.late:
+            return False
+        if alone(now.problem, joint, now.theta).leaves_noise(now.theta):
+            return False
+        if any(map(self._refiner.whole.settings.bends, lacking)):
+            return True
+        step = now.step.changed(terms=(*now.step.terms, *lacking))
         problem = self._refiner.problem_of(step)
         started = problem.parameters.started(now.values)
         new = np.array([name not in now.values for name in problem.settings.parameters])
         likelihood = make_likelihood(alone(problem, joint, started))
-        return promised(likelihood.of_independent_errors, started, new)
+        return promised(likelihood.of_independent_errors, started, new) > LESS
 
-    def _alone(self, now: Place, joint: int, new: Sequence[str]) -> Place:
+    def _alone(self, now: Place, joint: int, new: Sequence[str]) -> Place | None:
         """Refine a joint alone, and with new terms: all of them, and else each.
 
         What one term explains may show only beside another: what a wrong curve of a
         valve does is hidden while the joint does not ring. Those that it does as well
         without are dropped again. All begin where independent output errors lead: else
-        what helped the one would count for the terms. Where these hardly fall with a
-        term, it is not refined any further.
+        what helped the one would count for the terms. Where these hardly fall with all
+        terms, none is refined any further: None.
         """
         refiner = self._refiner
         step = now.step.changed(joint=joint)
@@ -176,6 +165,9 @@ class JointTrials:
         far = refiner.far_end(before, now.theta, step)
         begun = replace(now, step=step, theta=before.parameters.from_unit(far.point))
         enough = far.negative_log - LESS * before.measured.size
+        own, ends = self._ends_with(begun, new, enough)
+        if not ends or refiner.late:
+            return None
         end = refiner.on_the_way(before, begun.theta, step)
         as_it_is = Place(step, before, before.parameters.from_unit(end.point))
         without = predict_blocks(before, end)
@@ -183,19 +175,18 @@ class JointTrials:
         if len(new) > 1:
             choices += [[term] for term in new]
         for terms in choices:
-            tried = step.changed(terms=(*step.terms, *terms))
-            own, ends = self._ends_with(begun, tried, enough)
+            if terms != choices[0]:
+                own, ends = self._ends_with(begun, terms, enough)
             if refiner.late:
                 break
-            self._tried.alone(None, *terms)
             if not ends:
                 continue
             end = min(ends, key=lambda one: one.negative_log)
-            left_out = predict_blocks(own, end)
+            left_out = predict_blocks(own.problem, end)
             gained = gain(left_out, without)
             self._tried.alone(gained, *terms)
             if self._is_clear(gained):
-                found = Place(tried, own, own.parameters.from_unit(end.point))
+                found = replace(own, theta=own.problem.parameters.from_unit(end.point))
                 if len(terms) == 1:
                     return found
                 return self._fewer(found, terms, without, left_out)
@@ -229,9 +220,9 @@ class JointTrials:
         return found
 
     def _ends_with(
-        self, begun: Place, step: Step, enough: float
-    ) -> tuple[Problem, list[Refinement]]:
-        """Return the problem of a joint alone with further terms, and its refinements
+        self, begun: Place, terms: Sequence[str], enough: float
+    ) -> tuple[Place, list[Refinement]]:
+        """Return where a joint alone begins with further terms, and its refinements
         from where independent output errors lead, if these are less than `enough`.
 
         A valve's curve also begins at the speeds that the logs show, and all else of
@@ -239,20 +230,30 @@ class JointTrials:
         for it. Which of them leads nearer differs from valve to valve, and shows only
         at the end.
         """
+        step = begun.step.changed(terms=(*begun.step.terms, *terms))
         problem = self._refiner.problem_of(step)
         nothing = problem.parameters.started(begun.values)
         own = alone(problem, step.joint, nothing)
-        starts = {step: nothing}
-        if new_curves(problem, begun.problem):
+        first = self._refined_if(own, nothing, step, enough)
+        ends = [] if first is None else [first]
+        if ends and new_curves(problem, begun.problem):
             anew = np.where(own.parameters.free, problem.parameters.start, nothing)
-            starts[step.changed(start=2)] = by_speeds(problem, step.joint, anew)
-        ends = list[Refinement]()
-        for tried, start in starts.items():
-            far = self._refiner.far_end(own, start, tried)
-            if far.negative_log < enough:
-                near = own.parameters.from_unit(far.point)
-                ends.append(self._refiner.on_the_way(own, near, tried))
-        return own, ends
+            by_logs = by_speeds(problem, step.joint, anew)
+            second = self._refined_if(own, by_logs, step.changed(start=2), enough)
+            if second is not None:
+                ends.append(second)
+        return Place(step, own, nothing), ends
+
+    def _refined_if(
+        self, own: Problem, theta: Array, step: Step, enough: float
+    ) -> Refinement | None:
+        """Refine a joint alone from where independent output errors lead from theta,
+        (P,), if these are less than `enough`."""
+        far = self._refiner.far_end(own, theta, step)
+        if far.negative_log >= enough:
+            return None
+        near = own.parameters.from_unit(far.point)
+        return self._refiner.on_the_way(own, near, step)
 
     def _is_clear(self, gained: tuple[float, float]) -> bool:
         """Return whether a gain is clear: of several joints, some seem better by

@@ -18,10 +18,9 @@ from hydroid.fitting.starts import (
     new_curves,
     with_other_valve,
 )
-from hydroid.fitting.step import Start, Step
+from hydroid.fitting.step import Start
 from hydroid.fitting.tried import Tried
 from hydroid.posterior.error_model import make_likelihood
-from hydroid.problem.problem import Problem
 
 
 def each_alone(refiner: Refiner, begun: Place, joints: Sequence[int]) -> Array:
@@ -234,26 +233,17 @@ class JointTrials:
         problem = self._refiner.problem_of(step)
         nothing = problem.parameters.started(begun.values)
         own = alone(problem, step.joint, nothing)
-        first = self._refined_if(own, nothing, step, enough)
-        ends = [] if first is None else [first]
-        if ends and new_curves(problem, begun.problem):
+        starts = {step: nothing}
+        if new_curves(problem, begun.problem):
             anew = np.where(own.parameters.free, problem.parameters.start, nothing)
-            by_logs = by_speeds(problem, step.joint, anew)
-            second = self._refined_if(own, by_logs, step.changed(start=2), enough)
-            if second is not None:
-                ends.append(second)
+            starts[step.changed(start=2)] = by_speeds(problem, step.joint, anew)
+        ends = list[Refinement]()
+        for tried, start in starts.items():
+            far = self._refiner.far_end(own, start, tried)
+            if far.negative_log < enough:
+                near = own.parameters.from_unit(far.point)
+                ends.append(self._refiner.on_the_way(own, near, tried))
         return Place(step, own, nothing), ends
-
-    def _refined_if(
-        self, own: Problem, theta: Array, step: Step, enough: float
-    ) -> Refinement | None:
-        """Refine a joint alone from where independent output errors lead from theta,
-        (P,), if these are less than `enough`."""
-        far = self._refiner.far_end(own, theta, step)
-        if far.negative_log >= enough:
-            return None
-        near = own.parameters.from_unit(far.point)
-        return self._refiner.on_the_way(own, near, step)
 
     def _is_clear(self, gained: tuple[float, float]) -> bool:
         """Return whether a gain is clear: of several joints, some seem better by

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+from hydroid.arrays import rms
+from hydroid.fitting.baselines import fit_baselines
 from hydroid.fitting.left_out import gain, is_clear, predict_blocks
 from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.fitting.refiner import Place, Refiner
@@ -12,13 +14,17 @@ from hydroid.posterior.error_model import make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.rungs import BY_COMMAND
 
+FAR_LESS = 1 / 3
+"""part of a simple model's error: a joint that errs by less has more to lose than load
+and pump"""
+
 
 def with_joints_by_command(refiner: Refiner, kept: Place, tried: Tried) -> Place:
     """Return a place with the terms by which the speed of joints follows their commands
     alone, where that foretells parts left out better than load and pump.
 
-    Each joint that errs by more than noise is tried alone; `tried` takes what that
-    gained.
+    Each joint that errs by more than noise, and not by far less than simple models, is
+    tried alone; `tried` takes what that gained.
     """
     if not kept.problem.settings.rung.has(BY_COMMAND):
         return kept
@@ -28,10 +34,8 @@ def with_joints_by_command(refiner: Refiner, kept: Place, tried: Tried) -> Place
     erring = dict[str, int]()
     for term, joint in refiner.whole.settings.by_command_terms.items():
         tried.alone(None, term)
-        if joint in possible:
-            own = _of_joint(kept, joint)
-            if not own.leaves_noise(kept.theta):
-                erring[term] = joint
+        if joint in possible and _may_be_simpler(kept, joint):
+            erring[term] = joint
     now = kept
     for term, joint in erring.items():
         found = _by_command(refiner, now, term, joint)
@@ -45,6 +49,18 @@ def with_joints_by_command(refiner: Refiner, kept: Place, tried: Tried) -> Place
             step = now.step.changed(terms=place.step.terms)
             now = replace(place, step=step, problem=refiner.problem_of(step))
     return now
+
+
+def _may_be_simpler(kept: Place, joint: int) -> bool:
+    """Return whether a joint errs by more than noise, and not by far less than models
+    that know no load."""
+    own = _of_joint(kept, joint)
+    if own.leaves_noise(kept.theta):
+        return False
+    (error,) = own.rms(own.output_errors(kept.theta[None]))
+    ends = [*own.settings.arm.ranges.values()][joint - 1]
+    simple = fit_baselines(own.logs, joint, ends).values()
+    return error > FAR_LESS * min(rms(model.errors(own.logs)) for model in simple)
 
 
 def _by_command(

@@ -24,7 +24,7 @@ rises to 1 with the time constant `pump_rise`. Every section of the valve has a 
 check valve: oil never runs back to the pump. A joint whose own supply pressure is lower
 than the line's has a reducing valve. Joints without an actuator take nothing. One that
 follows a log takes what its actuator's chamber swallows at the logged speed, however
-low P falls.
+low P falls, and its valve shuts the open centre as far as its command says.
 
 A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the
 chambers eliminated, P changes by
@@ -97,10 +97,10 @@ def left_open(centre: float, c, opening: float) -> float:
 
 
 @compilable
-def centre_left(coefficients, driven, work) -> float:
+def centre_left(coefficients, driven, work, shut: float) -> float:
     """Part of the open centre of all valves that the openings `open_area` of the driven
-    joints leave."""
-    centre = 1.0
+    joints leave of what others have not shut."""
+    centre = 1.0 - shut
     for a in range(driven.size):
         j = driven[a]
         centre = left_open(centre, coefficients[j], work[j].open_area)
@@ -152,7 +152,7 @@ def begin_line(line, c, z, demanded: bool, step: float) -> None:
     if c.pump_rise > 0.0:
         line.decay = np.exp(-step / c.pump_rise)
     line.drawn = line.taken
-    line.centre = 1.0
+    line.centre = 1.0 - line.shut
 
 
 @compilable
@@ -218,7 +218,7 @@ def close_line(line, c) -> None:
     line.drawn = line.taken
     line.softness = 0.0
     line.swept = 0.0
-    line.centre = 1.0
+    line.centre = 1.0 - line.shut
 
 
 @compilable

@@ -61,6 +61,8 @@ class Log:
         conditions: engine speed over its reference, and how much warmer the oil is than
             at its own [K], shape (T, 2); 1 and 0 where the log has no such column. None:
             it has neither.
+        beside: commands of joints that only follow the log [%], shape (T, J): their
+            valves shut a pump's open centre. None: there are none.
         clock: time of day at which the recording begins, HH:MM:SS; empty where the file
             has none.
         rows: of its file; None: it is from no file, or a part of what a file gave.
@@ -78,6 +80,7 @@ class Log:
     begin: float = 0.0
     clock: str = ""
     conditions: Array | None = None
+    beside: Array | None = None
     rows: FileRows | None = None
 
     @property
@@ -191,10 +194,16 @@ class Log:
         return independent_samples(resting - self.start)
 
     def driving(self, joint: int) -> "Log":
-        """Return the recording without the commands of all joints but this one (number,
-        from 1)."""
+        """Return the recording in which only this joint (number, from 1) is driven; the
+        commands of the others are those `beside` it."""
         is_joint = np.arange(self.joints) == joint - 1
-        return replace(self, command=self.command * is_joint, rest=self._rest)
+        beside = self.command if self.beside is None else self.beside
+        return replace(
+            self,
+            command=self.command * is_joint,
+            beside=beside * ~is_joint,
+            rest=self._rest,
+        )
 
     def first(self, seconds: float) -> "Log":
         """Return the recording from its start to `seconds` after its first command."""
@@ -218,6 +227,8 @@ class Log:
             part = replace(part, pressure=self.pressure[samples])
         if self.conditions is not None:
             part = replace(part, conditions=self.conditions[samples])
+        if self.beside is not None:
+            part = replace(part, beside=self.beside[samples])
         if self.recorded is not None:
             part = replace(part, recorded=self.recorded[samples])
         return part

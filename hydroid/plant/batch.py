@@ -95,8 +95,7 @@ def _roll_some(rows, shared, plugin, plants, roll) -> None:
     bodies = shared.links.size
     # a warning of MuJoCo's has two numbers: every other one is its count
     numbers = 2 * shared.warnings.size - 1
-    nothing = np.empty(0)
-    no_openings = np.empty((0, 0))
+    nothing = np.empty((0, 0))
     at_references = np.empty((0, 2))
     no_states: Structs = np.empty((0, plants.state.shape[1]), plants.state.dtype)
     for i in range(rows[0], rows[1]):
@@ -131,7 +130,7 @@ def _roll_some(rows, shared, plugin, plants, roll) -> None:
             substeps=plugin.substeps,
         )
         course = Course(
-            plants.commands[i], plants.torque[i], nothing, no_openings, at_references
+            plants.commands[i], plants.torque[i], nothing, nothing, at_references
         )
         trace = Trace(plants.angle[i], no_states)
         roll(handles, actuators, plants.state[i], course, trace)

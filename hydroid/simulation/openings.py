@@ -23,6 +23,8 @@ from hydroid.hydraulics.kernel import SOURCE, Plugin
 from hydroid.hydraulics.records import SCRATCH
 from hydroid.hydraulics.valve import KNOTS
 
+Run = Callable[..., Iterable[None]]
+"""a pool's: runs a function for each of some values, maybe at the same time"""
 BEHIND_VALVE = [
     *(
         "damping",
@@ -119,7 +121,7 @@ def _of_each(
     depends_on: Structs,
     driven: set[int],
     make: Callable[[int, int], Array],
-    run: Callable[..., Iterable[None]],
+    run: Run,
 ) -> list[list[Array | None]]:
     """Return what `make` gives for every candidate's driven joints, by both numbers:
     once for those of a joint that are alike in what it depends on, (n, J) of
@@ -140,7 +142,7 @@ def _of_each(
 
 
 def valve_openings(
-    plugin: Plugin, states: Structs, commands: Array, run: Callable[..., Iterable[None]]
+    plugin: Plugin, states: Structs, commands: Array, run: Run
 ) -> list[Array]:
     """Return the mean opening of n candidates' valves in each step [m²], shape (steps,
     J) each.

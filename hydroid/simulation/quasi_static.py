@@ -59,7 +59,7 @@ def share_pump(
         return np.inf
     begin_line(line, pump, state[last], demanded, period)
     share = come_up(line, pump, period)
-    line.centre = centre_left(coefficients, driven, pad.joints)
+    line.centre = centre_left(coefficients, driven, pad.joints, line.shut)
     pressure = line_pressure(coefficients, driven, pad.joints, line, share)
     for j in range(state.size):
         z = state[j]
@@ -113,7 +113,7 @@ def lone_quasi_static(coefficients, pad, angle: float, loads) -> float:
         driven = np.zeros(1, np.intp)
         # where the search for the line's pressure begins
         line.pressure = c.relief
-        line.centre = centre_left(coefficients, driven, pad.joints)
+        line.centre = centre_left(coefficients, driven, pad.joints, 0.0)
         shared = line_pressure(coefficients, driven, pad.joints, line, 1.0)
         supply = min(supply, shared)
     return quasi_static_rod(c, w, supply)[0] / w.arm
@@ -130,7 +130,7 @@ def roll_quasi_static(arm, plugin, state, course, trace) -> None:
     coefficients = plugin.coefficients
     driven = plugin.order[plugin.idle :]
     period = plugin.period
-    commands, followed, taken, opening, conditions = course
+    commands, followed, others, opening, conditions = course
     steps = followed.shape[0]
     past = commands.shape[0] - steps
     pad = make_pad(plugin.order.size)
@@ -171,7 +171,9 @@ def roll_quasi_static(arm, plugin, state, course, trace) -> None:
             angle = arm.angle[column]
             spring = c.stiffness * (angle - arm.slack[column])
             weigh(c, work[j], angle, held[column] + spring)
-        line.taken = taken[k] if taken.size else 0.0
+        if others.size:
+            line.taken = others[k, 0]
+            line.shut = others[k, 1]
         pressure = np.inf
         if driven.size:
             pressure = share_pump(coefficients, driven, state, pad, demanded, period)

@@ -99,8 +99,9 @@ class Course(NamedTuple):
     """What drives an arm from step to step.
 
     commands: held during each step [%], after those before the start, shape (past + T
-    steps, J). torque: of pushed joints [N·m], shape (T steps, P). taken: flow from the
-    pump into pushed joints [m³/s], shape (T steps,); or it is empty. opening: of the
+    steps, J). torque: of pushed joints [N·m], shape (T steps, P). others: flow from
+    the pump into pushed joints [m³/s], and the part of the open centre that their
+    valves shut, shape (T steps, 2); or it is empty. opening: of the
     valves in the mean [m²], shape (T steps, J), where they are known before a
     quasi-static rollout; or it is empty. conditions: engine speed over its reference,
     and how much warmer the oil is than at its own [K], shape (T steps, 2); or it is
@@ -109,7 +110,7 @@ class Course(NamedTuple):
 
     commands: Array
     torque: Array
-    taken: Array = np.empty(0)
+    others: Array = np.empty((0, 0))
     opening: Array = np.empty((0, 0))
     conditions: Array = AT_REFERENCES
 
@@ -309,13 +310,14 @@ def write_sample(arm, trace, state, k: int) -> None:
 @compilable
 def roll(arm, plugin, state, course, trace) -> None:
     """Roll one candidate out as `SteppedArm.roll` does."""
-    commands, torque, taken, _, conditions = course
+    commands, torque, others, _, conditions = course
     steps = torque.shape[0]
     past = commands.shape[0] - steps
     pad = make_pad(state.size)
     for k in range(steps):
-        if taken.size:
-            pad.line[0].taken = taken[k]
+        if others.size:
+            pad.line[0].taken = others[k, 0]
+            pad.line[0].shut = others[k, 1]
         if conditions.size:
             take_conditions(plugin, pad, conditions[k])
         if state.size:

@@ -22,6 +22,7 @@ from hydroid.settings.arm import Arm
 from hydroid.settings.problem import SimulationSettings
 from hydroid.simulation.gravity import make_links
 from hydroid.simulation.laws import LAWS
+from hydroid.simulation.openings import Run, valve_openings
 from hydroid.simulation.roles import Roles, roles
 from hydroid.simulation.rollout import AT_REFERENCES, NO_LINKS, SteppedArm
 
@@ -225,6 +226,10 @@ class Scenario:
         self.outputs = np.searchsorted(self.arm.columns, outputs)
         # the last command acts only after the last sample
         self.command = np.repeat(log.command[:-1, moving], stepping.steps, axis=0)
+        self.beside = np.zeros((len(self.command), 0))
+        if log.beside is not None:
+            of_followers = log.beside[:-1, self.roles.following]
+            self.beside = np.repeat(of_followers, stepping.steps, axis=0)
         self.conditions = AT_REFERENCES
         if log.conditions is not None:
             self.conditions = np.repeat(log.conditions[:-1], stepping.steps, axis=0)
@@ -347,7 +352,7 @@ class Chain:
             period=model.opt.timestep,
             substeps=stepping.substeps,
         )
-        self._swallowed = (b"", np.empty((0, 0)))
+        self._others = (b"", np.empty((0, 0, 2)))
         self._links = NO_LINKS
         if stepping.rung.at_once:
             self._links = make_links(model)
@@ -385,22 +390,56 @@ class Chain:
         angle = np.tile(pose[self.columns], (len(balance), 1))
         return plugin, at_rest(plugin, angle, balance[:, self.columns])
 
-    def taken(self, candidates: Candidates, motion: Prescribed) -> Array:
-        """What P joints that follow a log take from the pump [m³/s], (n, steps); (n, 0)
-        if there are none."""
+    def others(
+        self, candidates: Candidates, motion: Prescribed, beside: Array, run: Run
+    ) -> Array:
+        """What P joints that follow a log take from the pump [m³/s], and the part of
+        the open centre that their valves shut, (n, steps, 2); (n, 0, 2) if there are
+        none.
+
+        `beside` has their commands [%], (steps, P), or none; `run` is a pool's.
+        """
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
-            return np.empty((len(candidates), 0))
+            return np.empty((len(candidates), 0, 2))
         # held, as a rule: so they are alike, and as they were the last time
         first, alike = distinct(joints)
         key = joints[first].tobytes()
-        taken = self._swallowed
-        if taken[0] != key:
-            some: Records = coefficients(joints[first])[:, None]  # pyright: ignore
-            flow = swallowed(some, motion.angle, motion.velocity).sum(axis=2)
-            taken = (key, flow)
-            self._swallowed = taken
-        return taken[1][alike]
+        others = self._others
+        if others[0] != key:
+            some: Records = joints[first]  # pyright: ignore[reportAssignmentType]
+            records: Records = coefficients(some)[:, None]  # pyright: ignore
+            flow = swallowed(records, motion.angle, motion.velocity).sum(axis=2)
+            shut = np.zeros(flow.shape)
+            if beside.size and (some.pump_bypass > 0.0).any():
+                shut = self._shut(some, beside, run)
+            others = (key, np.stack([flow, shut], axis=2))
+            self._others = others
+        return others[1][alike]
+
+    def _shut(self, joints: Records, beside: Array, run: Run) -> Array:
+        """Return the part of the open centre that the valves of n candidates' joints
+        that follow a log shut, (n, steps)."""
+        period = self._layout.period
+        substeps = self._layout.substeps
+        table = coefficients(joints, period, substeps).view(np.ndarray)
+        count = self.pushed.size
+        unused = np.zeros((count, count), np.intp)
+        valves = plugin_of(table, unused, period, substeps)
+        at_start = np.zeros(table.shape)
+        states = at_rest(valves, at_start, at_start)
+        before = np.zeros((valves.past, count))
+        commands = np.concatenate([before, beside])
+        openings = np.stack(valve_openings(valves, states, commands, run))
+        widest = np.where(
+            openings > 0.0,
+            table["a"]["opening"][:, None],
+            table["b"]["opening"][:, None],
+        )
+        share = np.divide(
+            abs(openings), widest, out=np.zeros(openings.shape), where=widest > 0.0
+        )
+        return np.minimum(share.max(axis=2), 1.0)
 
 
 def _take_measured(table: Structs, pressure: Array) -> None:

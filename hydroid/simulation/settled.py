@@ -135,7 +135,7 @@ def taken_at(plugin: Plugin, rods: Rods, sought: Sought, pressure: float) -> flo
     driven = plugin.order[plugin.idle :]
     pump = plugin.coefficients[plugin.order[plugin.order.size - 1]]
     drawn = drawn_at(plugin, rods, sought, pressure)
-    centre = centre_left(plugin.coefficients, driven, rods.work)
+    centre = centre_left(plugin.coefficients, driven, rods.work, 0.0)
     return drawn + past_valves(pressure, centre, pump)[0]
 
 

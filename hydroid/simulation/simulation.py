@@ -67,7 +67,8 @@ class _Ready:
         plugin: their actuators.
         states: of these at the start, (n, J) of JOINT_STATE.
         commands: those of a `Course`.
-        taken: flow from the pump into joints that follow the log [m³/s], (n, steps).
+        others: flow from the pump into joints that follow the log [m³/s], and the part
+            of the open centre that their valves shut, (n, steps, 2).
         openings: of the valves, where they are known before, of each candidate.
     """
 
@@ -78,7 +79,7 @@ class _Ready:
     plugin: Plugin
     states: Structs
     commands: Array
-    taken: Array
+    others: Array
     openings: list[Array]
 
 
@@ -265,7 +266,7 @@ class Simulation:
             plugin=plugin,
             states=states,
             commands=commands,
-            taken=chain.taken(candidates, scenario.prescribed),
+            others=chain.others(candidates, scenario.prescribed, scenario.beside, run),
             openings=openings,
         )
 
@@ -316,9 +317,9 @@ class Simulation:
         history = np.zeros((kept, len(state)), JOINT_STATE)
         angle[0] = start
         history[0] = state
-        taken = ready.taken[row]
+        others = ready.others[row]
         openings = ready.openings[row]
-        course = Course(ready.commands, torque, taken, openings, scenario.conditions)
+        course = Course(ready.commands, torque, others, openings, scenario.conditions)
         # the start is known: what is rolled out comes after it
         trace = Trace(angle[1:], history[1:])
         arm.roll(actuators, state, course, trace)

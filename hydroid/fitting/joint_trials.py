@@ -133,15 +133,12 @@ class JointTrials:
     def _may_gain(self, now: Place, joint: int, lacking: Sequence[str]) -> bool:
         """Return whether terms that a joint lacks may gain anything for it alone.
 
-        Most joints of most machines lack no term. What else than a curve may gain, the
-        linear model tells; a curve that bends is not linear in its numbers.
+        Most joints of most machines lack no term, and a Jacobian tells.
         """
         if not lacking or self._refiner.late:
             return False
         if alone(now.problem, joint, now.theta).leaves_noise(now.theta):
             return False
-        if any(map(self._refiner.whole.settings.bends, lacking)):
-            return True
         step = now.step.changed(terms=(*now.step.terms, *lacking))
         problem = self._refiner.problem_of(step)
         started = problem.parameters.started(now.values)

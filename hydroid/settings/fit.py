@@ -13,7 +13,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from hydroid.errors import HydroidError, SettingsError
 from hydroid.files import Plain, find_config
 from hydroid.parameters import ParameterSet
-from hydroid.quantity_table import CURVE, TARGETS
+from hydroid.quantity_table import TARGETS
 from hydroid.rungs import (
     BY_COMMAND,
     RUNGS,
@@ -254,11 +254,6 @@ class FitSettings(Settings):
             for term, joints in owners.items()
             if (joint,) in joints and all(one and len(one) == 1 for one in joints)
         )
-
-    def bends(self, term: str) -> bool:
-        """Return whether a term frees the curve of a valve."""
-        own = [one for one in self.parameters.values() if one.term == term]
-        return any(one.quantity.startswith(CURVE) for one in own)
 
     @property
     def by_command_terms(self) -> dict[str, int]:

@@ -147,13 +147,13 @@ class JointTrials:
         return promised(likelihood.of_independent_errors, started, new) > LESS
 
     def _alone(self, now: Place, joint: int, new: Sequence[str]) -> Place | None:
-        """Refine a joint alone, and with new terms: all of them, and else each.
+        """Refine a joint alone, and with new terms, all together.
 
         What one term explains may show only beside another: what a wrong curve of a
         valve does is hidden while the joint does not ring. Those that it does as well
         without are dropped again. All begin where independent output errors lead: else
-        what helped the one would count for the terms. Where these hardly fall with all
-        terms, none is refined any further: None.
+        what helped the one would count for the terms. Where these hardly fall with the
+        terms, nothing is refined any further: None.
         """
         refiner = self._refiner
         step = now.step.changed(joint=joint)
@@ -167,26 +167,16 @@ class JointTrials:
         end = refiner.on_the_way(before, begun.theta, step)
         as_it_is = Place(step, before, before.parameters.from_unit(end.point))
         without = predict_blocks(before, end)
-        choices = [[*new]]
-        if len(new) > 1:
-            choices += [[term] for term in new]
-        for terms in choices:
-            if terms != choices[0]:
-                own, ends = self._ends_with(begun, terms, enough)
-            if refiner.late:
-                break
-            if not ends:
-                continue
-            end = min(ends, key=lambda one: one.negative_log)
-            left_out = predict_blocks(own.problem, end)
-            gained = gain(left_out, without)
-            self._tried.alone(gained, *terms)
-            if self._is_clear(gained):
-                found = replace(own, theta=own.problem.parameters.from_unit(end.point))
-                if len(terms) == 1:
-                    return found
-                return self._fewer(found, terms, without, left_out)
-        return as_it_is
+        end = min(ends, key=lambda one: one.negative_log)
+        left_out = predict_blocks(own.problem, end)
+        gained = gain(left_out, without)
+        self._tried.alone(gained, *new)
+        if not self._is_clear(gained):
+            return as_it_is
+        found = replace(own, theta=own.problem.parameters.from_unit(end.point))
+        if len(new) == 1:
+            return found
+        return self._fewer(found, new, without, left_out)
 
     def _fewer(
         self, found: Place, terms: Sequence[str], none: LeftOut, every: LeftOut

@@ -11,6 +11,7 @@ from two_joints import OPENINGS, PARAMETERS, TRUTH, drive, two_joints
 from hydroid.advice.terms import terms
 from hydroid.errors import SettingsError
 from hydroid.files import Plain
+from hydroid.fitting import by_command
 from hydroid.fitting.fit import Fit, fit
 from hydroid.fitting.starts import valve_alone
 from hydroid.fitting.watcher import Silent
@@ -121,6 +122,16 @@ def test_a_fit_of_one_joint_chooses_too(problem):
     found = fit(problem.varied(problem.settings.changed({"outputs": (2,)})))
     assert found.final == TILT
     assert found.tried["by_command_lift"] is None
+
+
+def test_a_joint_that_errs_far_less_than_simple_models_is_not_tried(
+    problem, monkeypatch
+):
+    """The bar is put above every error."""
+    monkeypatch.setattr(by_command, "FAR_LESS", np.inf)
+    found = fit(problem)
+    assert found.final == "refined"
+    assert {found.tried[name] for name in CHOICES} == {None}
 
 
 def test_it_begins_at_the_full_speeds_that_it_had_or_at_those_of_the_logs(problem):

@@ -132,6 +132,15 @@ def test_the_start_pose_is_the_recordings_not_the_joints():
     ]
 
 
+def test_a_lone_joint_knows_the_commands_beside_its_own(problem):
+    (log,) = problem.logs
+    lone = log.driving(3)
+    np.testing.assert_array_equal(lone.command + lone.beside, log.command)
+    assert not lone.beside[:, 2].any()
+    again = lone.driving(3).part(50, 90)
+    np.testing.assert_array_equal(again.beside, lone.beside[50:90])
+
+
 def test_joint_by_joint_then_together_finds_the_truth(problem, truth):
     watcher = Watcher()
     result = fit(problem, watcher)

@@ -105,17 +105,18 @@ class Ladder:
         # joints that were searched alone have no need of the others yet
         if not (by_starts and self._lone):
             self._rung(self._step, if_better=False)
-        self._add_lone_terms()
+        self._add_lone_terms(self._lone)
         # what else the model needs shows where its errors are no larger than need be
         if self._settings.terms():
             self._begin_anew()
+            self._add_lone_terms(self._not_refined())
         of_joints = self._step.terms
         self._add_terms(rung)
         if self._step.terms == of_joints:
             return
         self._try_each_without(of_joints)
         with_shared = self._step.terms
-        self._add_lone_terms()
+        self._add_lone_terms(self._lone)
         if self._step.terms != with_shared:
             self._add_terms(rung)
 
@@ -136,16 +137,26 @@ class Ladder:
             if term not in self._step.terms and of_joints[term] != 1:
                 self._rung(self._step.changed(terms=(*self._step.terms, term)))
 
-    def _add_lone_terms(self) -> None:
-        """Try the terms of each joint on that joint alone, and the better ones of all
-        joints together."""
+    def _not_refined(self) -> dict[int, tuple[str, ...]]:
+        """Return the terms of joints of which one has not been refined: it promised too
+        little, and may promise more now."""
+        gains = self.tried.gains
+        return {
+            joint: terms
+            for joint, terms in self._lone.items()
+            if any(gains.get(term) is None for term in self._place.lacking(terms))
+        }
+
+    def _add_lone_terms(self, lone: Mapping[int, Sequence[str]]) -> None:
+        """Try terms of joints, by joint, each on that joint alone, and the better ones
+        of all joints together."""
         refined = self.kept.name in self.refinements
         if refined and self._is_at_end():
             if not self._refiner.late:
-                for terms in self._lone.values():
+                for terms in lone.values():
                     self.tried.alone(None, *self._place.lacking(terms))
             return
-        trials = JointTrials(self._refiner, self._lone, self.tried)
+        trials = JointTrials(self._refiner, lone, self.tried)
         found = trials.found(self._place)
         step = self._step.changed(terms=found.step.terms)
         if not refined:

@@ -77,14 +77,21 @@ class JointTrials:
         terms: that can be fitted on each joint alone, by joint, numbered from 1; a term
             of each joint, as the oil, is among those of all.
         tried: takes what the terms gained.
+        start: added to the numbers of starts, which checkpoints have in their names: a
+            round that may try the same terms once more has another one.
     """
 
     def __init__(
-        self, refiner: Refiner, terms: Mapping[int, Sequence[str]], tried: Tried
+        self,
+        refiner: Refiner,
+        terms: Mapping[int, Sequence[str]],
+        tried: Tried,
+        start: int,
     ) -> None:
         self._refiner = refiner
         self._terms = terms
         self._tried = tried
+        self._start = start
 
     def found(self, kept: Place) -> Place:
         """Return the place with the terms that joints alone ask for, and where these
@@ -103,7 +110,8 @@ class JointTrials:
             if new.intersection(terms) - fitted_with.get(joint, set())
         ]
         # the checkpoints of what is begun alone are not those of a later trial
-        apart = replace(found, step=found.step.changed(start=Start.JOINTS_FIRST))
+        start = Start.JOINTS_FIRST + self._start
+        apart = replace(found, step=found.step.changed(start=start))
         return replace(found, theta=each_alone(self._refiner, apart, behind))
 
     def _joint_by_joint(self, kept: Place) -> tuple[Place, dict[int, set[str]]]:
@@ -156,7 +164,7 @@ class JointTrials:
         terms, nothing is refined any further: None.
         """
         refiner = self._refiner
-        step = now.step.changed(joint=joint)
+        step = now.step.changed(joint=joint, start=self._start)
         before = alone(now.problem, joint, now.theta)
         far = refiner.far_end(before, now.theta, step)
         begun = replace(now, step=step, theta=before.parameters.from_unit(far.point))
@@ -223,7 +231,8 @@ class JointTrials:
         starts = {step: nothing}
         if new_curves(problem, begun.problem):
             anew = np.where(own.parameters.free, problem.parameters.start, nothing)
-            starts[step.changed(start=2)] = by_speeds(problem, step.joint, anew)
+            by_logs = step.changed(start=step.start + 2)
+            starts[by_logs] = by_speeds(problem, step.joint, anew)
         ends = list[Refinement]()
         for tried, start in starts.items():
             far = self._refiner.far_end(own, start, tried)

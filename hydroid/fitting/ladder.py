@@ -109,7 +109,7 @@ class Ladder:
         # what else the model needs shows where its errors are no larger than need be
         if self._settings.terms():
             self._begin_anew()
-            self._add_lone_terms(self._not_refined())
+            self._add_lone_terms(self._not_refined(), Start.JOINTS_LATER)
         of_joints = self._step.terms
         self._add_terms(rung)
         if self._step.terms == of_joints:
@@ -147,25 +147,30 @@ class Ladder:
             if any(gains.get(term) is None for term in self._place.lacking(terms))
         }
 
-    def _add_lone_terms(self, lone: Mapping[int, Sequence[str]]) -> None:
+    def _add_lone_terms(
+        self, lone: Mapping[int, Sequence[str]], start: int = 0
+    ) -> None:
         """Try terms of joints, by joint, each on that joint alone, and the better ones
-        of all joints together."""
+        of all joints together.
+
+        `start` is added to the numbers of starts: a second round has others.
+        """
         refined = self.kept.name in self.refinements
         if refined and self._is_at_end():
             if not self._refiner.late:
                 for terms in lone.values():
                     self.tried.alone(None, *self._place.lacking(terms))
             return
-        trials = JointTrials(self._refiner, lone, self.tried)
+        trials = JointTrials(self._refiner, lone, self.tried, start)
         found = trials.found(self._place)
         step = self._step.changed(terms=found.step.terms)
         if not refined:
             self._rung(step, if_better=False, begun=found.theta)
         elif step != self._step:
-            self._rung_from(Start.JOINTS_FIRST, step, found.theta)
+            self._rung_from(Start.JOINTS_FIRST + start, step, found.theta)
         elif found.theta is not self.kept.theta:
             # a joint went on alone from where all together had ended
-            self._rung_from(Start.AGAIN, step, found.theta, if_better=False)
+            self._rung_from(Start.AGAIN + start, step, found.theta, if_better=False)
 
     def _try_each_without(self, terms: Sequence[str]) -> None:
         """Try to drop terms, one after the other."""
@@ -247,7 +252,7 @@ class Ladder:
             self.kept = self._measured(problem, end, self._step)
 
     def _rung_from(
-        self, start: Start, step: Step, theta: Array, *, if_better: bool = True
+        self, start: int, step: Step, theta: Array, *, if_better: bool = True
     ) -> None:
         """Refine as `_rung` does from a start with a number, which the checkpoints have
         in their names."""

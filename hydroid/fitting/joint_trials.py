@@ -1,7 +1,7 @@
 """Terms and starts of single joints, tried on each joint alone while the others follow
 their logs: that takes seconds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -77,8 +77,9 @@ class JointTrials:
         terms: that can be fitted on each joint alone, by joint, numbered from 1; a term
             of each joint, as the oil, is among those of all.
         tried: takes what the terms gained.
-        start: added to the numbers of starts, which checkpoints have in their names: a
-            round that may try the same terms once more has another one.
+        joints: that are tried.
+        round_number: from 0: rounds of one fit may try the same terms, and must not
+            share checkpoints.
     """
 
     def __init__(
@@ -86,12 +87,14 @@ class JointTrials:
         refiner: Refiner,
         terms: Mapping[int, Sequence[str]],
         tried: Tried,
-        start: int,
+        joints: Collection[int],
+        round_number: int,
     ) -> None:
         self._refiner = refiner
         self._terms = terms
         self._tried = tried
-        self._start = start
+        self._joints = joints
+        self._start = Start.ROUND * round_number
 
     def found(self, kept: Place) -> Place:
         """Return the place with the terms that joints alone ask for, and where these
@@ -119,8 +122,8 @@ class JointTrials:
         terms each joint has been fitted."""
         fitted_with = dict[int, set[str]]()
         now = kept
-        for joint, terms in self._terms.items():
-            lacking = now.lacking(terms)
+        for joint in self._joints:
+            lacking = now.lacking(self._terms[joint])
             found = None
             if self._may_gain(now, joint, lacking):
                 found = self._alone(now, joint, lacking)
@@ -173,6 +176,8 @@ class JointTrials:
         if not ends or refiner.late:
             return None
         end = refiner.on_the_way(before, begun.theta, step)
+        if refiner.late:
+            return None
         as_it_is = Place(step, before, before.parameters.from_unit(end.point))
         without = predict_blocks(before, end)
         end = min(ends, key=lambda one: one.negative_log)
@@ -197,14 +202,14 @@ class JointTrials:
         """
         left_out = every
         for term in terms:
-            if self._refiner.late:
-                break
             rest = tuple(one for one in found.step.terms if one != term)
             step = found.step.changed(terms=rest)
             problem = self._refiner.problem_of(step)
             started = problem.parameters.started(found.values)
             own = alone(problem, step.joint, started)
             end = self._refiner.anew(own, started, step)
+            if self._refiner.late:
+                break
             without = predict_blocks(own, end)
             gained = gain(left_out, without)
             self._tried.alone(gained, term)

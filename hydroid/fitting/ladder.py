@@ -9,7 +9,7 @@ least squares has also tried it from elsewhere (`Ladder._begin_anew`).
 """
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -105,18 +105,18 @@ class Ladder:
         # joints that were searched alone have no need of the others yet
         if not (by_starts and self._lone):
             self._rung(self._step, if_better=False)
-        self._add_lone_terms(self._lone)
+        self._add_lone_terms(self._lone, 0)
         # what else the model needs shows where its errors are no larger than need be
         if self._settings.terms():
             self._begin_anew()
-            self._add_lone_terms(self._not_refined(), Start.JOINTS_LATER)
+            self._add_lone_terms(self._not_refined(), 1)
         of_joints = self._step.terms
         self._add_terms(rung)
         if self._step.terms == of_joints:
             return
         self._try_each_without(of_joints)
         with_shared = self._step.terms
-        self._add_lone_terms(self._lone)
+        self._add_lone_terms(self._lone, 2)
         if self._step.terms != with_shared:
             self._add_terms(rung)
 
@@ -137,40 +137,40 @@ class Ladder:
             if term not in self._step.terms and of_joints[term] != 1:
                 self._rung(self._step.changed(terms=(*self._step.terms, term)))
 
-    def _not_refined(self) -> dict[int, tuple[str, ...]]:
-        """Return the terms of joints of which one has not been refined: it promised too
-        little, and may promise more now."""
+    def _not_refined(self) -> list[int]:
+        """Return the joints, from 1, that lack a term which no joint alone was refined
+        with: it promised too little, and may promise more now."""
         gains = self.tried.gains
-        return {
-            joint: terms
+        return [
+            joint
             for joint, terms in self._lone.items()
             if any(gains.get(term) is None for term in self._place.lacking(terms))
-        }
+        ]
 
-    def _add_lone_terms(
-        self, lone: Mapping[int, Sequence[str]], start: int = 0
-    ) -> None:
-        """Try terms of joints, by joint, each on that joint alone, and the better ones
-        of all joints together.
-
-        `start` is added to the numbers of starts: a second round has others.
-        """
+    def _add_lone_terms(self, joints: Collection[int], round_number: int) -> None:
+        """Try the terms of some joints, each on that joint alone, and the better ones
+        of all joints together; rounds are numbered from 0."""
         refined = self.kept.name in self.refinements
         if refined and self._is_at_end():
             if not self._refiner.late:
-                for terms in lone.values():
-                    self.tried.alone(None, *self._place.lacking(terms))
+                for joint in joints:
+                    lacking = self._place.lacking(self._lone[joint])
+                    self.tried.alone(None, *lacking)
             return
-        trials = JointTrials(self._refiner, lone, self.tried, start)
+        trials = JointTrials(
+            self._refiner, self._lone, self.tried, joints, round_number
+        )
         found = trials.found(self._place)
         step = self._step.changed(terms=found.step.terms)
         if not refined:
             self._rung(step, if_better=False, begun=found.theta)
         elif step != self._step:
-            self._rung_from(Start.JOINTS_FIRST + start, step, found.theta)
+            start = Start.JOINTS_FIRST + Start.ROUND * round_number
+            self._rung_from(start, step, found.theta)
         elif found.theta is not self.kept.theta:
             # a joint went on alone from where all together had ended
-            self._rung_from(Start.AGAIN + start, step, found.theta, if_better=False)
+            start = Start.AGAIN + Start.ROUND * round_number
+            self._rung_from(start, step, found.theta, if_better=False)
 
     def _try_each_without(self, terms: Sequence[str]) -> None:
         """Try to drop terms, one after the other."""

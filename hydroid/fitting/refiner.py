@@ -51,7 +51,8 @@ class Refiner:
 
     Attributes:
         whole: the problem of the whole fit, with every term.
-        leads_on: whether more may follow the first least squares of all joints.
+        leads_on: whether least squares of all joints is done more than once, so that
+            only the last one need be exact.
         late: whether time is up: what was refined last has then not ended.
     """
 

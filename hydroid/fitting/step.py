@@ -26,8 +26,8 @@ class Start(IntEnum):
     """a joint alone as it is, beside one by its command alone"""
     JOINTS_FIRST = 7
     """with terms that joints alone have asked for"""
-    JOINTS_LATER = 8
-    """added to those of joints alone, once all have been fitted together"""
+    ROUND = 8
+    """what is added to those of one round of trials of joints alone in the next one"""
 
 
 @dataclass(frozen=True)

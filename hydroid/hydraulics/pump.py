@@ -24,7 +24,8 @@ rises to 1 with the time constant `pump_rise`. Every section of the valve has a 
 check valve: oil never runs back to the pump. A joint whose own supply pressure is lower
 than the line's has a reducing valve. Joints without an actuator take nothing. One that
 follows a log takes what its actuator's chamber swallows at the logged speed, however
-low P falls, and its valve shuts the open centre as far as its command says.
+low P falls; its commands bring the pump up, and its valve shuts the open centre as far
+as they say.
 
 A sub-step is implicit in P, as it is in the chamber pressures and velocities. With the
 chambers eliminated, P changes by
@@ -141,13 +142,21 @@ def come_up(line, c, step: float) -> float:
 
 
 @compilable
+def take_others(line, others) -> None:
+    """Take what joints that follow a log do in a step, a row of `Course.others`."""
+    line.taken = others[0]
+    line.shut = others[1]
+    line.asked = others[2]
+
+
+@compilable
 def begin_line(line, c, z, demanded: bool, step: float) -> None:
     """Begin a step with the line as the state of a joint has it; `demanded`: whether a
-    command is not 0."""
+    command is not 0, besides those of joints that follow a log."""
     line.pressure = z.line
     line.share = z.share
     line.demand = z.demand
-    line.demanded = 1.0 if demanded else 0.0
+    line.demanded = 1.0 if demanded else line.asked
     line.decay = 0.0
     if c.pump_rise > 0.0:
         line.decay = np.exp(-step / c.pump_rise)

@@ -170,9 +170,11 @@ SCRATCH = np.dtype(
 
 LINE = np.dtype(
     _fields(
-        # of the step: state, whether there is a command, decay of φ; flow into joints
-        # that follow a log, and the part of the open centre that their valves shut
-        "pressure share demand demanded decay taken shut "
+        # of the step: state, whether there is a command, decay of φ
+        "pressure share demand demanded decay "
+        # of joints that follow a log: flow into them, the part of the open centre that
+        # their valves shut, and whether they have a command
+        "taken shut asked "
         "centre "  # part of the valves' open centre that is left
         "faster "  # part by which the engine is faster than at the reference
         # of a sub-step: as `pump` sums them; change of pressure

@@ -197,11 +197,13 @@ class Log:
         """Return the recording in which only this joint (number, from 1) is driven; the
         commands of the others are those `beside` it."""
         is_joint = np.arange(self.joints) == joint - 1
-        beside = self.command if self.beside is None else self.beside
+        every = self.command
+        if self.beside is not None:
+            every = every + self.beside
         return replace(
             self,
             command=self.command * is_joint,
-            beside=beside * ~is_joint,
+            beside=every * ~is_joint,
             rest=self._rest,
         )
 

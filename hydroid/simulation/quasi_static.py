@@ -40,7 +40,13 @@ from hydroid.hydraulics.elementwise import compilable
 from hydroid.hydraulics.joint import mean_opening
 from hydroid.hydraulics.kernel import make_pad, take_conditions
 from hydroid.hydraulics.oil import overshoot, store_oil
-from hydroid.hydraulics.pump import begin_line, centre_left, come_up, line_pressure
+from hydroid.hydraulics.pump import (
+    begin_line,
+    centre_left,
+    come_up,
+    line_pressure,
+    take_others,
+)
 from hydroid.hydraulics.valve import rod_speed
 from hydroid.simulation.gravity import hold, load_links
 from hydroid.simulation.rollout import write_sample
@@ -172,8 +178,7 @@ def roll_quasi_static(arm, plugin, state, course, trace) -> None:
             spring = c.stiffness * (angle - arm.slack[column])
             weigh(c, work[j], angle, held[column] + spring)
         if others.size:
-            line.taken = others[k, 0]
-            line.shut = others[k, 1]
+            take_others(line, others[k])
         pressure = np.inf
         if driven.size:
             pressure = share_pump(coefficients, driven, state, pad, demanded, period)

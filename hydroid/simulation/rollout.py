@@ -38,6 +38,7 @@ from hydroid.hydraulics.kernel import (
     take_conditions,
     take_over,
 )
+from hydroid.hydraulics.pump import take_others
 from hydroid.hydraulics.records import COEFFICIENTS, JOINT_STATE
 from hydroid.simulation.gravity import LINK
 
@@ -100,8 +101,8 @@ class Course(NamedTuple):
 
     commands: held during each step [%], after those before the start, shape (past + T
     steps, J). torque: of pushed joints [N·m], shape (T steps, P). others: flow from
-    the pump into pushed joints [m³/s], and the part of the open centre that their
-    valves shut, shape (T steps, 2); or it is empty. opening: of the
+    the pump into pushed joints [m³/s], the part of the open centre that their valves
+    shut, and 1 where one has a command, shape (T steps, 3); or it is empty. opening: of the
     valves in the mean [m²], shape (T steps, J), where they are known before a
     quasi-static rollout; or it is empty. conditions: engine speed over its reference,
     and how much warmer the oil is than at its own [K], shape (T steps, 2); or it is
@@ -316,8 +317,7 @@ def roll(arm, plugin, state, course, trace) -> None:
     pad = make_pad(state.size)
     for k in range(steps):
         if others.size:
-            pad.line[0].taken = others[k, 0]
-            pad.line[0].shut = others[k, 1]
+            take_others(pad.line[0], others[k])
         if conditions.size:
             take_conditions(plugin, pad, conditions[k])
         if state.size:

@@ -196,6 +196,8 @@ class Scenario:
         roles: of the arm's joints.
         outputs: columns of the outputs among the moving joints, shape (K,).
         command: held during each step [%], shape (steps, V).
+        beside: the same of the joints that follow the log, shape (steps, P), or (steps,
+            0) where they have none.
         conditions: engine speed and oil temperature during each step, as of a `Course`.
         period: between samples [s].
         prescribed: the joints that follow the log.
@@ -352,7 +354,7 @@ class Chain:
             period=model.opt.timestep,
             substeps=stepping.substeps,
         )
-        self._others = (b"", np.empty((0, 0, 2)))
+        self._others = (b"", np.empty((0, 0, 3)))
         self._links = NO_LINKS
         if stepping.rung.at_once:
             self._links = make_links(model)
@@ -393,15 +395,14 @@ class Chain:
     def others(
         self, candidates: Candidates, motion: Prescribed, beside: Array, run: Run
     ) -> Array:
-        """What P joints that follow a log take from the pump [m³/s], and the part of
-        the open centre that their valves shut, (n, steps, 2); (n, 0, 2) if there are
-        none.
+        """What P joints that follow a log do, as of a `Course`, (n, steps, 3); (n, 0,
+        3) if there are none.
 
         `beside` has their commands [%], (steps, P), or none; `run` is a pool's.
         """
         joints: Records = candidates.joints[:, self._pushed]  # pyright: ignore[reportAssignmentType]
         if not self.joints.size or np.isinf(joints.pump_flow).all():
-            return np.empty((len(candidates), 0, 2))
+            return np.empty((len(candidates), 0, 3))
         # held, as a rule: so they are alike, and as they were the last time
         first, alike = distinct(joints)
         key = joints[first].tobytes()
@@ -412,22 +413,23 @@ class Chain:
             flow = swallowed(records, motion.angle, motion.velocity).sum(axis=2)
             shut = np.zeros(flow.shape)
             if beside.size and (some.pump_bypass > 0.0).any():
-                shut = self._shut(some, beside, run)
-            others = (key, np.stack([flow, shut], axis=2))
+                shut = self._shut(some, motion.angle[0], beside, run)
+            asked = np.broadcast_to(np.any(beside != 0.0, axis=1), flow.shape)
+            others = (key, np.stack([flow, shut, asked], axis=2))
             self._others = others
         return others[1][alike]
 
-    def _shut(self, joints: Records, beside: Array, run: Run) -> Array:
+    def _shut(self, joints: Records, angle: Array, beside: Array, run: Run) -> Array:
         """Return the part of the open centre that the valves of n candidates' joints
-        that follow a log shut, (n, steps)."""
+        that follow a log shut, (n, steps); they start at an angle [rad], (P,)."""
         period = self._layout.period
         substeps = self._layout.substeps
         table = coefficients(joints, period, substeps).view(np.ndarray)
         count = self.pushed.size
         unused = np.zeros((count, count), np.intp)
         valves = plugin_of(table, unused, period, substeps)
-        at_start = np.zeros(table.shape)
-        states = at_rest(valves, at_start, at_start)
+        at_start = np.tile(angle, (len(table), 1))
+        states = at_rest(valves, at_start, np.zeros(table.shape))
         before = np.zeros((valves.past, count))
         commands = np.concatenate([before, beside])
         openings = np.stack(valve_openings(valves, states, commands, run))

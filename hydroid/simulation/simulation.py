@@ -31,7 +31,7 @@ from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation.openings import valve_openings
+from hydroid.simulation.openings import Run, valve_openings
 from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
@@ -67,8 +67,7 @@ class _Ready:
         plugin: their actuators.
         states: of these at the start, (n, J) of JOINT_STATE.
         commands: those of a `Course`.
-        others: flow from the pump into joints that follow the log [m³/s], and the part
-            of the open centre that their valves shut, (n, steps, 2).
+        others: what joints that follow the log do, as of a `Course`, (n, steps, 3).
         openings: of the valves, where they are known before, of each candidate.
     """
 
@@ -239,7 +238,7 @@ class Simulation:
         self,
         candidates: Candidates,
         arm: SteppedArm,
-        run: Callable[..., Iterable[None]],
+        run: Run,
     ) -> "_Ready":
         """Make n candidates ready: all are balanced here, one by one, on one arm.
 

@@ -90,6 +90,11 @@ def test_a_lone_joint_moves_as_with_all_others(problem, truth):
 PUMPS = {
     "its flow is shared": {"hydraulics.pump_flow": 1.2},
     "on open centres": {"hydraulics.pump_flow": 3.0, "hydraulics.pump_bypass": 2.0},
+    "it comes up": {
+        "hydraulics.pump_flow": 3.0,
+        "hydraulics.pump_idle": 0.1,
+        "hydraulics.pump_rise": 2.0,
+    },
 }
 
 
@@ -97,7 +102,7 @@ PUMPS = {
 @pytest.mark.parametrize("model", ["dynamic", "quasi-static"])
 def test_joints_that_follow_the_log_take_their_part_of_the_pump(truth, pump, model):
     """Two joints share a pump that cannot serve both, or whose oil runs past both
-    valves: each alone is as slow as beside the other.
+    valves, or that a command brings up: each alone is as slow as beside the other.
 
     What is left is the low-pass of the motion that is followed, a small part of the
     pump's effect.

@@ -236,8 +236,8 @@ def _lacks_columns(
 
 
 def _key(signal: Signal) -> str:
-    """Return the key of the settings that name the column of such signals."""
-    return f"log.{signal.kind.replace(' ', '_')}"
+    """Return the key of the settings that name the column of a signal."""
+    return signal.setting or f"log.{signal.kind.replace(' ', '_')}"
 
 
 def _header_of(table: Table) -> str:

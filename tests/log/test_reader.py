@@ -283,6 +283,17 @@ def test_a_joint_that_the_arm_lacks_is_refused(tmp_path: Path) -> None:
         read(edited(tmp_path, lambda rows: None), settings)
 
 
+def test_a_column_that_is_lacking_is_named_with_the_setting_that_asks_for_it(
+    tmp_path: Path,
+) -> None:
+    own = {"joints": {2: {"angle": {"column": "pot", "unit": "deg"}}}}
+    (fault,) = faults(
+        edited(tmp_path, lambda rows: None), LogSettings.model_validate(own)
+    )
+    assert "lacks 'pot'" in fault.what
+    assert "set log.joints.2.angle to the right column" in fault.hint
+
+
 def test_a_joint_that_is_not_compared_may_be_absent(tmp_path: Path) -> None:
     path = edited(
         tmp_path, lambda rows: [row.__delitem__(slice(2, 5, 2)) for row in rows]

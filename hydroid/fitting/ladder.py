@@ -9,7 +9,7 @@ least squares has also tried it from elsewhere (`Ladder._begin_anew`).
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -30,6 +30,7 @@ from hydroid.posterior.error_model import likelihood_at, make_likelihood
 from hydroid.posterior.whiteness import lasting
 from hydroid.problem.problem import Problem
 from hydroid.rungs import Rung
+from hydroid.settings.fit import FitSettings
 
 SECONDS = 20.0
 """of each log, over which another model is first tried [s]"""
@@ -66,7 +67,7 @@ class Ladder:
         self._begun_anew: Step | None = None
         self._refiner = refiner
         self._settings = refiner.whole.settings
-        self._lone = _lone_terms(problem, self._settings.terms_of)
+        self._lone = _lone_terms(problem, self._settings)
 
     def climb(self) -> None:
         """Refine the estimate with each model and term that the settings of the fit
@@ -389,11 +390,11 @@ class Ladder:
 
 
 def _lone_terms(
-    problem: Problem, terms_of: Callable[[int], tuple[str, ...]]
+    problem: Problem, settings: FitSettings
 ) -> Mapping[int, tuple[str, ...]]:
     """Return the terms that can be fitted on each joint alone, by joint, numbered from
     1; a term of each joint, as the oil, is among those of all."""
-    terms = {joint: terms_of(joint) for joint in lone_joints(problem)}
+    terms = {joint: settings.terms_of(joint) for joint in lone_joints(problem)}
     return {joint: own for joint, own in terms.items() if own}
 
 

@@ -19,6 +19,7 @@ from hydroid.commands.inputs import (
     as_list,
     command,
     load_settings,
+    note_shipped_arm,
     refuse_overwriting,
 )
 from hydroid.commands.joint_units import in_joint_units
@@ -97,6 +98,8 @@ def check(
         print(*hydroid.check(["a.csv", "b.csv"]).result[0].findings, sep="\\n")
     """
     settings = load_settings(config, set)
+    if config == "fit-mech":
+        note_shipped_arm(settings)
     names = settings.arm.joint_names
     with Progress() as progress:
         files = _read_files(as_list(logs), settings, progress, repair=repair)

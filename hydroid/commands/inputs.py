@@ -108,6 +108,14 @@ def setting_changes(
     return changes
 
 
+def note_shipped_arm(settings: FitSettings) -> None:
+    """Say that a command without --config takes the arm that hydroid ships."""
+    what = f"note: the arm is the shipped {settings.arm.name}"
+    LOGGER.log(
+        NOTE, f"{what}: for your machine give --config, which `hydroid init` writes"
+    )
+
+
 def load_settings(
     config: ConfigSource, overrides: SettingChanges = None
 ) -> FitSettings:

@@ -16,6 +16,7 @@ from hydroid.commands.inputs import (
     command,
     load_settings,
     names,
+    note_shipped_arm,
     open_model,
     open_values,
     setting_changes,
@@ -28,7 +29,7 @@ from hydroid.estimate import FitSummary
 from hydroid.files import Plain
 from hydroid.log import Log
 from hydroid.parallel.cluster import open_workers
-from hydroid.progress import LOGGER, NOTE
+from hydroid.progress import LOGGER
 from hydroid.quantity_table import MECHANICAL
 from hydroid.settings.arm import TIP_LOAD
 from hydroid.settings.fit import FitSettings
@@ -213,10 +214,7 @@ def _fit(
         # what --set says has the last word, and keeps its place among the changes
         settings = load_settings(config, {**changes, **stated, **changes})
     if config == f"fit-{stage}":
-        what = f"note: the arm is the shipped {settings.arm.name}"
-        LOGGER.log(
-            NOTE, f"{what}: for your machine give --config, which `hydroid init` writes"
-        )
+        note_shipped_arm(settings)
     budget = options.seconds()
     read = read_logs(options.logs, settings, repair=options.repair, fitted=True)
     with (

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from hydroid.arrays import rms
 from hydroid.fitting.baselines import fit_baselines
-from hydroid.fitting.left_out import gain, is_clear, predict_blocks
+from hydroid.fitting.left_out import Gain, gain, is_clear, predict_blocks
 from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.fitting.refiner import Place, Refiner
 from hydroid.fitting.starts import LESS, valve_alone
@@ -65,7 +65,7 @@ def _may_be_simpler(kept: Place, joint: int) -> bool:
 
 def _by_command(
     refiner: Refiner, now: Place, term: str, joint: int
-) -> tuple[tuple[float, float], Place] | None:
+) -> tuple[Gain, Place] | None:
     """Refine a joint alone as it is, and by its command; return what that gains, and
     where it leads.
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hydroid.arrays import Array, record
+from hydroid.fitting.left_out import Gain
 from hydroid.problem.problem import Problem
 
 
@@ -30,7 +31,7 @@ class Estimate:
     overall: float
     rms: float
     responses: tuple[Array, ...]
-    gained: tuple[float, float] | None = None
+    gained: Gain | None = None
 
     @property
     def usable(self) -> bool:

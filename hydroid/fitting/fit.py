@@ -11,10 +11,10 @@ from hydroid.arrays import Array, record
 from hydroid.fitting.checkpoints import Checkpoints
 from hydroid.fitting.estimates import Estimate, simulated
 from hydroid.fitting.ladder import Ladder
+from hydroid.fitting.left_out import Gain
 from hydroid.fitting.refinement import Refinement
 from hydroid.fitting.refiner import Refiner
 from hydroid.fitting.search import Searched, search
-from hydroid.fitting.tried import Gain
 from hydroid.fitting.watcher import Silent, Watcher
 from hydroid.posterior.linear import estimate_box
 from hydroid.posterior.quantities import Quantities, quantities

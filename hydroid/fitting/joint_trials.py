@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from hydroid.arrays import Array
-from hydroid.fitting.left_out import LeftOut, gain, is_clear, predict_blocks
+from hydroid.fitting.left_out import Gain, LeftOut, gain, is_clear, predict_blocks
 from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.fitting.refinement import Refinement, promised
 from hydroid.fitting.refiner import Place, Refiner
@@ -246,7 +246,7 @@ class JointTrials:
                 ends.append(self._refiner.on_the_way(own, near, tried))
         return Place(step, own, nothing), ends
 
-    def _is_clear(self, gained: tuple[float, float]) -> bool:
+    def _is_clear(self, gained: Gain) -> bool:
         """Return whether a gain is clear: of several joints, some seem better by
         chance."""
         return is_clear(*gained, among=len(self._terms))

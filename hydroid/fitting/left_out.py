@@ -44,6 +44,10 @@ Raftery (1995)"""
 COMPARED = RefinementSettings(iterations=60, gain_tolerance=1e-4)
 """of a fit that only serves a comparison"""
 
+Gain = tuple[float, float]
+"""by how much a model foretells parts of the logs left out better than another, and the
+standard error of that (`gain`)"""
+
 
 @record
 class LeftOut:
@@ -173,7 +177,7 @@ def _log_size(matrix: Array) -> float:
     return float(np.linalg.slogdet(matrix).logabsdet)
 
 
-def gain(after: LeftOut, before: LeftOut) -> tuple[float, float]:
+def gain(after: LeftOut, before: LeftOut) -> Gain:
     """Return by how much one model foretells the parts better than another, and the
     standard error of that.
 

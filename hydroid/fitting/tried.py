@@ -1,8 +1,6 @@
 """What a fit has tried of single joints, and what that gained."""
 
-Gain = tuple[float, float]
-"""by how much a model foretells parts of the logs left out better than another, and the
-standard error of that (`left_out.gain`)"""
+from hydroid.fitting.left_out import Gain
 
 
 class Tried:

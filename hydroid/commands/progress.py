@@ -117,13 +117,11 @@ class FitProgress(Progress):
 
     def __init__(self, settings: "FitSettings", budget: float | None = None) -> None:
         super().__init__()
-        self._end = math.inf if budget is None else time.monotonic() + budget
+        self._begun = time.monotonic()
+        self._end = math.inf if budget is None else self._begun + budget
         self._settings = settings
         search = settings.search
         self._total = 1 + getattr(search, search.algorithm).generations
-        self._terms = settings.terms()
-        self._number = 1
-        self._rungs = 1 + len(self._terms) + len(settings.rungs)
 
     def generation(self, row: "Array") -> bool:
         """Take a row of `fitting.search.HISTORY`; return whether time is up."""
@@ -132,10 +130,9 @@ class FitProgress(Progress):
 
     def refining(self, step: "Step", simulated: int, rms: float) -> bool:
         """Take a step of the fit, its number of simulations, and its rms error [rad] so
-        far.
+        far; return whether time is up.
 
-        A rung is the search, or a model or term of the ladder; what is kept is refined
-        as the last one. Returns whether time is up.
+        How many steps there will be shows only as the fit goes on, so none are counted.
         """
         from hydroid.units import display
 
@@ -147,27 +144,18 @@ class FitProgress(Progress):
         all_slide = {*joints} <= {*arm.slides}
         error = display(slides=all_slide).way(math.degrees(rms))
         text = f"rms error {error}, {simulated} simulations"
-        self(f"{self._rung(step)}, {about}", simulated, None, text)
+        self(f"{self._since_begun()}, {_model(step)}, {about}", simulated, None, text)
         return time.monotonic() > self._end
 
-    def _rung(self, step: "Step") -> str:
-        """Return which step of how many it is, and what is done there."""
-        total = self._rungs
-        # the last step, in which what is kept is refined
-        number = total
-        if step.phase or step.start:
-            models = {"start": 1, "refined": 2, "joint": 2}
-            # the first rung is refined, and its terms are tried; then come the others
-            further = self._settings.rungs[1:]
-            first = total - len(further) + 1
-            models |= {rung.name: first + k for k, rung in enumerate(further)}
-            number = models.get(step.model, 1)
-            for place, term in enumerate(self._terms, 3):
-                if term in step.terms:
-                    number = max(number, place)
-        # a rung is compared with the one below: that leads no step back
-        self._number = max(number, self._number)
-        words = f"start {step.start}" if step.model == "start" else step.estimate
-        if step.numbers:
-            words += " from nine numbers"
-        return f"step {self._number} of {total} ({words})"
+    def _since_begun(self) -> str:
+        """Return the time that the fit has taken, as 1:05 (min:s)."""
+        minutes, seconds = divmod(int(time.monotonic() - self._begun), 60)
+        return f"{minutes}:{seconds:02d}"
+
+
+def _model(step: "Step") -> str:
+    """Return which model a step of a fit refines, and from where."""
+    words = f"start {step.start}" if step.model == "start" else step.estimate
+    if step.numbers:
+        words += " from nine numbers"
+    return words

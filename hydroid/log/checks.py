@@ -55,9 +55,10 @@ def _lacking_numbers(
             cell = table.text(signal.name, int(recording.rows[rows[0]]))
             what = f"{cell[:30]!r} is not a number" if cell else "no value is there"
             kind = "no time" if signal.kind == "time" else "hole"
-            yield recording.finding(
-                "error", kind, rows, signal, what=what, longest=settings.repair_s
-            )
+            if cell and len(rows) == len(values) - torn.sum():
+                kind = "text column"
+            numbers = {"longest": settings.repair_s, "setting": signal.setting}
+            yield recording.finding("error", kind, rows, signal, what=what, **numbers)
 
 
 def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:

@@ -50,6 +50,13 @@ REVERSED = (
     "way instead (compare arm.png), set scale: -1 at its angle and not at its command: gravity "
     "follows the angle"
 )
+LACKING = {
+    (True, False): "no angle found for {}: simulated by the command, and compared with "
+    "nothing. If a column holds the angle, name it in fit.yaml (log.joints)",
+    (False, True): "no command found for {}: not fitted",
+    (False, False): "no command and no angle found for {}: not fitted",
+}
+"""by whether a joint has a command and an angle"""
 
 MOVED = 0.5  # travel from which a joint moves [deg]
 FOLLOWED = 1.0  # travel above which a joint that no command drives is followed [deg]
@@ -332,14 +339,17 @@ def _valves(
 
 
 def _lacking(entries: Mapping[int, Plain], names: Sequence[str]) -> Iterator[str]:
-    """Yield for which joints the log has no angle, and no command."""
-    for what in ("angle", "command"):
-        lacking = list[str]()
-        for joint, name in enumerate(names, 1):
-            if not entries.get(joint, {}).get(what):
-                lacking.append(name)
-        if lacking:
-            yield f"no {what} found for {listed(lacking)}"
+    """Yield for which joints the log has no angle, no command, or neither, and what
+    that means for them."""
+    lacking: dict[tuple[bool, bool], list[str]] = {key: [] for key in LACKING}
+    for joint, name in enumerate(names, 1):
+        entry = entries.get(joint, {})
+        has = bool(entry.get("command")), bool(entry.get("angle"))
+        if not all(has):
+            lacking[has].append(name)
+    for has, joints in lacking.items():
+        if joints:
+            yield LACKING[has].format(listed(joints))
 
 
 def _has_targets(table: Table) -> bool:

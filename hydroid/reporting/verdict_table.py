@@ -12,7 +12,7 @@ from hydroid.estimate import FitSummary
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.fitting.baselines import NAMES
-from hydroid.fitting.comparison import LEAST_BLOCKS
+from hydroid.fitting.comparison import BLOCK, LEAST_BLOCKS
 from hydroid.fitting.validation import HORIZONS, Prediction
 from hydroid.fitting.verdict import JUDGED, THE_FIT, WORSE
 from hydroid.joint_verdict import Comparison, JointVerdict, Outcome, Verdict
@@ -49,7 +49,10 @@ _RULES = {
     Verdict.ROUGHLY: "no other rule holds, and after 1, 5 or 10 s it is better than each simple model",
 }
 """when a joint has a verdict, the rule that is asked first in front"""
-_NO_WORD = f" Whole logs are compared from {LEAST_BLOCKS} logs on."
+_NO_WORD = (
+    f" Without a word there is too little to compare: it takes {LEAST_BLOCKS} unseen logs, "
+    f"or for 1, 5 and 10 s ahead {LEAST_BLOCKS * BLOCK:g} s of them."
+)
 WHOLE = "whole logs"
 """name of a column"""
 FITTED = "whole fitted logs"
@@ -130,10 +133,7 @@ def _tested_row(verdict: JointVerdict) -> dict[str, Cell]:
     if not verdict.unseen_logs:
         return row
     whole = _whole_errors(verdict)
-    # one log, or a few, cannot tell: the numbers stand there alone
-    row[WHOLE] = _beside_best(
-        whole, verdict.compared_whole, verdict.shown, least=LEAST_BLOCKS
-    )
+    row[WHOLE] = _beside_best(whole, verdict.compared_whole, verdict.shown)
     for i, seconds in enumerate(HORIZONS):
         errors = {name: errors[i] for name, errors in verdict.horizons_deg.items()}
         compared = {name: outcomes[i] for name, outcomes in verdict.compared.items()}
@@ -151,13 +151,12 @@ def _beside_best(
     errors: Mapping[str, float | None],
     compared: Mapping[str, Comparison],
     shown: Display,
-    least: int = 0,
 ) -> str | None:
     """Return the fit's error beside that of the best simple model, as "2.1 (2.3) cannot
     be told".
 
-    Nothing where the logs are too short for the prediction time; no word of fewer than
-    `least` blocks.
+    Nothing where the logs are too short for the prediction time; no word where a log,
+    or a few, cannot tell.
     """
     simple = dict[str, float]()
     for name, error in errors.items():
@@ -172,7 +171,7 @@ def _beside_best(
     if fit is None:
         return f"diverged ({two_digits(scale * simple[best])})"
     ours, theirs = told_apart(scale * fit, scale * simple[best])
-    if comparison.blocks < least:
+    if comparison.blocks < LEAST_BLOCKS:
         return f"{ours} ({theirs})"
     return f"{ours} ({theirs}) {comparison.outcome}"
 

@@ -240,6 +240,16 @@ def test_where_many_rows_hold_no_numbers_none_is_left_out(tmp_path: Path) -> Non
         row[3] = "off"
     (fault,) = faults(save(tmp_path / "log.csv", table))
     assert "'off' is not a number (and 4 more rows, up to line 15)" in fault.what
+    assert "--repair" in fault.hint
+
+
+def test_a_column_of_text_is_not_to_be_repaired(tmp_path: Path) -> None:
+    table = lines(cells())
+    for row in table[1:]:
+        row[3] = "off"
+    (fault,) = faults(save(tmp_path / "log.csv", table))
+    assert "this column holds no numbers" in fault.what
+    assert fault.hint == "name a column that holds numbers in log.angle"
 
 
 def test_a_part_is_written_and_read_back_to_the_same_bits(tmp_path: Path) -> None:

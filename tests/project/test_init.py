@@ -397,6 +397,26 @@ def test_a_joint_that_no_fitted_log_drives_is_not_compared(place: Path, tmp_path
     assert hydroid.load_settings(tmp_path / "two/fit.yaml").outputs == (2, 3)
 
 
+def test_a_joint_without_an_angle_is_named_with_what_becomes_of_it(
+    place: Path, tmp_path: Path
+):
+    def no_stick(rows: list[list[str]]) -> None:
+        for row in rows:
+            del row[-1]
+
+    log = renamed(place, tmp_path / "log.csv", no_stick)
+    made = init(tmp_path / "mine", place / "mine" / "arm.yaml", [log])
+    assert (
+        made.missing,
+        hydroid.load_settings(tmp_path / "mine/fit.yaml").outputs,
+    ) == (
+        "",
+        (1, 2),
+    )
+    (said,) = [line for line in made.columns if "no angle found" in line]
+    assert "stick_joint: simulated by the command, and compared with nothing" in said
+
+
 def test_an_error_names_no_file_that_is_gone(tmp_path: Path):
     robot = MODELS / "bad_arms/inf_origin.urdf"
     done = CliRunner().invoke(

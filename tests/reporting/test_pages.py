@@ -237,7 +237,7 @@ def test_the_verdict_shows_each_time_beside_the_best_simple_model_and_digits_tha
             "nine numbers": (0.2, 0.6, 1.0, 2.88, 6.0),
         },
         compared={
-            name: tuple(Comparison(outcome=o) for o in some)
+            name: tuple(Comparison(outcome=o, blocks=9) for o in some)
             for name, some in outcomes.items()
         },
         compared_whole={name: Comparison(outcome=Outcome.UNTOLD) for name in outcomes},

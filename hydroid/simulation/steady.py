@@ -50,7 +50,6 @@ LEAST_AREA = 0.1
 """part of its area by which a chamber takes in oil at least, however much the oil
 yields on the way"""
 PRECISE = 1e-13  # relative error at which a search ends
-HALVINGS = 60  # of the line's pressure: to rounding
 
 
 @compilable
@@ -212,27 +211,62 @@ def balanced_speed(supply: float, c, w, takes) -> Any:
 
 
 @compilable
+def excess_at(pressure: float, c, w, takes) -> float:
+    """Flow [m³/s] by which more is taken from the line at a pressure [Pa] than the pump
+    gives."""
+    _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
+    past, _ = past_valves(pressure, left_open(1.0, c, w.open_area), c)
+    return drawn + past - delivery(pressure, 1.0, c)[0]
+
+
+@compilable
+def lone_pressure(c, w, takes) -> float:
+    """Pressure of the line [Pa] at which the pump gives what the only joint takes.
+
+    What is taken rises with the pressure, and what is given falls.
+    """
+    low = lowest(c)
+    high = c.relief
+    over = excess_at(high, c, w, takes)
+    if over <= 0.0:
+        return high
+    under = excess_at(low, c, w, takes)
+    if under >= 0.0:
+        return low
+    pressure = low
+    last = 0
+    count = 0
+    while high - low > PRECISE * c.relief:
+        before = pressure
+        count += 1
+        pressure = false_position(low, high, under, over)
+        # where the rule creeps, a halving now and then
+        if count % 4 == 0:
+            pressure = 0.5 * (low + high)
+        excess = excess_at(pressure, c, w, takes)
+        near = abs(pressure - before) <= PRECISE * c.relief
+        if near or abs(excess) <= PRECISE * c.pump_flow:
+            break
+        if excess > 0.0:
+            high = pressure
+            over = excess
+            under = illinois(under, last > 0)
+            last = 1
+        else:
+            low = pressure
+            under = excess
+            over = illinois(over, last < 0)
+            last = -1
+    return pressure
+
+
+@compilable
 def fed_speed(c, w, takes) -> Any:
     """Speed [m/s] of the rod at which forces and the pump's flow balance, and the
     supply [Pa] there."""
-    if c.pump_flow == np.inf:
-        return balanced_speed(c.supply_pressure, c, w, takes)[0], c.supply_pressure
-    low = lowest(c)
-    high = c.relief
-    pressure = c.relief
-    # what is drawn rises with the line's pressure, and what is given falls
-    centre = left_open(1.0, c, w.open_area)
-    for _ in range(HALVINGS):
-        _, drawn = balanced_speed(min(pressure, c.supply_pressure), c, w, takes)
-        drawn += past_valves(pressure, centre, c)[0]
-        if drawn > delivery(pressure, 1.0, c)[0]:
-            high = pressure
-        elif pressure == c.relief:
-            break
-        else:
-            low = pressure
-        pressure = 0.5 * (low + high)
-    supply = min(pressure, c.supply_pressure)
+    supply = c.supply_pressure
+    if c.pump_flow != np.inf:
+        supply = min(lone_pressure(c, w, takes), supply)
     return balanced_speed(supply, c, w, takes)[0], supply
 
 

@@ -94,6 +94,13 @@ class Layout:
     missing: str = ""
     candidates: tuple[str, ...] = ()
 
+    @property
+    def speeds(self) -> Mapping[int, float]:
+        """How fast joints are at full command, by number from 1 [rad/s, m/s]; of those
+        that follow no command, how fast they move in the first log."""
+        seen = {joint: motion.speed for joint, motion in self.motions.items()}
+        return seen | {joint: valve.speed for joint, valve in self.valves.items()}
+
 
 def find_layout(
     table: Table | None,

@@ -157,10 +157,8 @@ def _arm_of_boxes(
 
 
 def _sizes(arm: Arm, layout: Layout) -> tuple[JointSize, ...]:
-    """Return the sizes of what moves the joints, by the speeds that a log shows."""
-    return joint_sizes(
-        arm, {joint: motion.speed for joint, motion in layout.motions.items()}
-    )
+    """Return the sizes of what moves the joints, by the speeds that the logs show."""
+    return joint_sizes(arm, layout.speeds)
 
 
 def _stand_ins(arm: Arm) -> Iterator[str]:

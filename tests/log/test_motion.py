@@ -36,6 +36,19 @@ def test_the_speed_is_that_of_fast_motion():
     assert 0.4 < JointMotion(joint_log(), 1).speed < 0.5
 
 
+def test_a_joint_that_rests_most_of_the_time_is_as_fast():
+    moving = joint_log()
+    rest = 30 * len(moving.time)
+    noise = 2e-4 * np.random.default_rng(1).normal(size=(rest, 1))
+    angle = np.concatenate([moving.angle, moving.angle[-1:] + noise])
+    command = np.concatenate([moving.command, np.zeros((rest, 1))])
+    time = PERIOD * np.arange(len(command))
+    resting = JointMotion(replace(moving, time=time, command=command, angle=angle), 1)
+    assert resting.speed == pytest.approx(JointMotion(moving, 1).speed, rel=0.2)
+    # the noise is no motion that nobody has asked for
+    assert sum(resting.unasked) < 1.0
+
+
 def test_half_a_second_of_slow_motion_makes_no_dead_band():
     """Nothing is commanded between rest and 30 %, and the joint barely has time to
     start there."""

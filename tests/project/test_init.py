@@ -80,6 +80,35 @@ def test_a_fit_starts_near_the_log(place: Path):
     assert np.all(np.abs(np.log(np.array(openings) / true)) < np.log(2.5))
 
 
+def test_a_joint_that_seldom_moves_is_sized_by_how_fast_it_moves(
+    place: Path, tmp_path: Path
+):
+    """Of its log, nearly all is rest; draws and openings are those of the log without."""
+
+    def rests(rows: list[list[str]]) -> None:
+        first, last = rows[1], rows[-1]
+        for k in range(1, 30 * len(rows)):
+            still = [
+                cell if "angle" in name else "0"
+                for name, cell in zip(rows[0], last, strict=True)
+            ]
+            rows.append([f"{float(last[0]) + 20 * k:g}", *still[1:]])
+
+    log = renamed(place, tmp_path / "log.csv", rests)
+    arm = place / "mine" / "arm.yaml"
+    init(tmp_path / "rests", arm, [log])
+    init(tmp_path / "moves", arm, [place / "move_0.csv"])
+    rested, moved = (
+        hydroid.load_settings(tmp_path / name / "fit.yaml").parameters
+        for name in ("rests", "moves")
+    )
+    for joint in ("swing", "boom", "stick"):
+        draws = (one[f"draw_A_{joint}"].nominal for one in (rested, moved))
+        assert next(draws) == pytest.approx(next(draws), rel=0.3)
+        dampings = (one[f"D_{joint}"].sd for one in (rested, moved))
+        assert next(dampings) == pytest.approx(next(dampings), rel=0.3)
+
+
 def test_each_side_of_a_valve_starts_where_the_logs_show_it(place: Path):
     """The machine's valves have dead bands of 20 and 30 %; the boom's is wired the
     other way round."""

@@ -86,7 +86,7 @@ def test_a_joint_that_seldom_moves_is_sized_by_how_fast_it_moves(
     """Of its log, nearly all is rest; draws and openings are those of the log without."""
 
     def rests(rows: list[list[str]]) -> None:
-        first, last = rows[1], rows[-1]
+        last = rows[-1]
         for k in range(1, 30 * len(rows)):
             still = [
                 cell if "angle" in name else "0"

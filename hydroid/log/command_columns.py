@@ -2,11 +2,13 @@
 where it rests."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from hydroid.arrays import Array
+from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.columns import Column, Entry
 from hydroid.log.joint_columns import Assignment
@@ -21,19 +23,21 @@ from hydroid.log.table import Signal, Table
 
 SMALL_COMMAND = 5.0
 """of a log's commands, the smallest is below this [%], if one of 0 is none"""
+NOISE = 0.005
+"""part of the range of a command that a lever at rest may show"""
 NEVER_AT_REST = (
     "it is never 0, so where it rests is not known: correct scale and offset"
 )
 
 
 def command_entries(
-    table: Table, commands: Mapping[int, Assignment]
+    tables: Sequence[Table], commands: Mapping[int, Assignment]
 ) -> dict[int, Entry]:
     """Return the settings of the columns of commands, and what they are taken for, by
-    joint."""
+    joint: by the first table that gives them."""
     cells = dict[int, _Cells]()
     for joint, command in commands.items():
-        cells[joint] = _cells(table, command.columns)
+        cells[joint] = _first_given(tables, command.columns)
     ranges = of_one_scale([of_joint.likely for of_joint in cells.values()])
     for joint, likely in zip(cells, ranges, strict=True):
         cells[joint] = cells[joint]._replace(likely=likely)
@@ -51,8 +55,15 @@ class _Cells(NamedTuple):
     likely: CommandRange | None
 
     @property
+    def spread(self) -> float:
+        """From its least to its largest cell; 0 without any."""
+        if np.isnan(self.values).all():
+            return 0.0
+        return float(np.nanmax(self.values) - np.nanmin(self.values))
+
+    @property
     def changes(self) -> bool:
-        return bool(np.nanmax(self.values) > np.nanmin(self.values))
+        return self.spread > 0.0
 
     @property
     def tells(self) -> bool:
@@ -62,6 +73,18 @@ class _Cells(NamedTuple):
         is_around_zero = self.likely is not None and not self.likely.offset
         values = self.values[np.isfinite(self.values)]
         return not is_around_zero or comes_near_zero(values)
+
+
+def _first_given(tables: Sequence[Table], columns: Sequence[Column]) -> _Cells:
+    """Return the cells of the first table that gives a command, and not the noise of a
+    lever at rest alone; of further tables some may not have it."""
+    first, *further = tables
+    every = [_cells(first, columns)]
+    for table in further:
+        with suppress(LogError, KeyError):
+            every.append(_cells(table, columns))
+    enough = NOISE * max(cells.spread for cells in every)
+    return next(cells for cells in every if cells.spread >= enough)
 
 
 def _cells(table: Table, columns: Sequence[Column]) -> _Cells:

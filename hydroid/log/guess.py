@@ -66,7 +66,8 @@ def guess_columns(
     Columns may have the names of the links that the joints move instead; positions of
     joints (from 1) that slide are in m. Lengths of the cylinders of joints, `rods`,
     stand for their angles. Counts of an encoder or a converter are taken for the
-    `ranges` of the joints [rad], from the lowest to the highest of all tables.
+    `ranges` of the joints [rad], from the lowest to the highest of all tables. A command
+    that the first table does not give has the range of the first one that does.
     """
     table, *further = tables
     arm = Joints(joints, links, slides, rods, ranges)
@@ -80,7 +81,7 @@ def guess_columns(
         reasons[0] += ", by its values: no column is called a time"
     commands = by_joint(_of_kind(columns, "command"), arm, reasons)
     angles = by_joint(_of_kind(columns, "angle"), arm, reasons)
-    of_commands = command_entries(table, commands)
+    of_commands = command_entries(tables, commands)
     of_angles = angle_entries(angles, arm)
     reasons += _joint_reasons(arm, (commands, of_commands), (angles, of_angles))
     reasons += _target_reasons(columns)

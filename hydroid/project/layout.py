@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hydroid.arrays import Array, record
+from hydroid.arrays import Limits, record
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.fitting.valve_start import JointStart, fitted_valve
@@ -19,7 +19,6 @@ from hydroid.log import (
     stands_still,
 )
 from hydroid.log.clues import column_unit, kind_of
-from hydroid.log.condition_columns import condition_guess
 from hydroid.log.conditions import varies
 from hydroid.log.log import LEAST_COMMAND
 from hydroid.log.mapping import angle_margin
@@ -68,9 +67,9 @@ class Layout:
     numbers say.
 
     `outputs` are joints that a log drives and measures, `motions` how the measured ones
-    move, by number from 1, and `valves` those by which the outputs follow commands of
-    the sign that these have in the section; `left_out` are further logs that cannot be
-    read by it; `reach`: the ends of what joints do in the others [rad, m]; `reasons`
+    move in the log that tells most of it, by number from 1, and `valves` those by which
+    the outputs follow commands of the sign that these have in the section; `left_out`
+    are further logs that cannot be read by it; `reach`: the ends of what joints do in the others [rad, m]; `reasons`
     have a line for each column that is not `unused`; `varied`: an engine's speed or an
     oil's temperature of which the logs hold enough to tell its effect; `followed`: a joint that no
     command drives moves. `missing` says
@@ -86,9 +85,7 @@ class Layout:
     followed: bool
     valves: Mapping[int, JointStart] = field(default_factory=dict[int, JointStart])
     left_out: tuple[Path, ...] = ()
-    reach: Mapping[int, tuple[float, float]] = field(
-        default_factory=dict[int, tuple[float, float]]
-    )
+    reach: Mapping[int, Limits] = field(default_factory=dict[int, Limits])
     origin: str = GUESSED
     varied: tuple[Input, ...] = ()
     missing: str = ""
@@ -97,7 +94,7 @@ class Layout:
     @property
     def speeds(self) -> Mapping[int, float]:
         """How fast joints are at full command, by number from 1 [rad/s, m/s]; of those
-        that follow no command, how fast they move in the first log."""
+        whose valve is not known, how fast they move."""
         seen = {joint: motion.speed for joint, motion in self.motions.items()}
         return seen | {joint: valve.speed for joint, valve in self.valves.items()}
 
@@ -141,15 +138,10 @@ def find_layout(
         if "period_s" not in given.model_fields_set:
             _set_period(layout, table)
         return layout
-    guess = guessed_section(table, arm, order)
-    if guess.mirrored:
-        # sensors without a scale: what one log reaches is not all of their range
-        tables = [*others.tables(progress)]
-        guess = guessed_section(table, arm, order, tables)
+    guess = guessed_section([table, *others.tables(progress)], arm, order)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
         return _skeleton(table, arm, guess, missing)
-    guess = _of_all_logs(table, guess, others, progress)
     layout = _seen(table, arm, guess, others, GUESSED, progress)
     _set_period(layout, table)
     return layout
@@ -160,31 +152,6 @@ def _set_period(layout: Layout, table: Table) -> None:
     follow, has been seen at a finer one."""
     settings = validate(layout.section, LogSettings, table.source)
     layout.section["period_s"] = simulation_period(table, settings)
-
-
-def _of_all_logs(
-    table: Table, guess: ColumnGuess, others: Others, progress: Progress
-) -> ColumnGuess:
-    """Return a guess whose engine speed and oil temperature have the median of all logs
-    as their reference; without what cannot be used of all."""
-    named: list[Input] = [name for name in EFFECTS if name in guess.log]
-    if not named or not others.paths:
-        return guess
-    tables = [table, *others.tables(progress)]
-    section = {**guess.log}
-    reasons = [*guess.reasons]
-    unused = [*guess.unused]
-    for name in named:
-        settings = section[name]
-        column = settings["column"]
-        found = condition_guess(tables, column, name, settings["unit"])
-        at = next(k for k, why in enumerate(reasons) if why.startswith(f"{column}: "))
-        reasons[at] = found.reason
-        section[name] = found.settings
-        if not found.settings:
-            del section[name]
-            unused.append(column)
-    return guess._replace(log=section, reasons=tuple(reasons), unused=tuple(unused))
 
 
 def _seen(
@@ -207,7 +174,7 @@ def _seen(
     measured = [joint for joint, entry in entries.items() if entry["angle"]]
     driven = _with_command(entries, measured)
     left_out = list[Path]()
-    reach = dict[int, tuple[float, float]]()
+    reach = dict[int, Limits]()
     motions = dict[int, JointMotion]()
     varied: tuple[Input, ...] = ()
     if logs:
@@ -217,10 +184,10 @@ def _seen(
         logs += fitted
         varied = tuple(name for name in EFFECTS if varies(logs, name))
         reach = reach_of([*logs, *unseen], measured)
-        motions = {joint: motion_of(logs[0], joint) for joint in measured}
+        motions = {joint: _telling(logs, joint) for joint in measured}
         _refuse_rest(table, driven, logs, arm.joint_names)
         driven = _driven(driven, logs, arm.joint_names, reasons)
-    wrong = _turn_commands(entries, motions, arm, reasons)
+    wrong = _turn_commands(entries, motions, reach, arm, reasons)
     reasons += _lacking(entries, arm.joint_names)
     if origin == GUESSED:
         _forget_standing(entries, measured, logs)
@@ -238,6 +205,16 @@ def _seen(
         origin=origin,
         varied=varied,
     )
+
+
+def _telling(logs: Sequence[Log], joint: int) -> JointMotion:
+    """Return a joint's motion in the log that drives it most, or moves it farthest where
+    none does: it may stand in the first one."""
+    motions = [motion_of(log, joint) for log in logs]
+    most = max(motions, key=lambda motion: motion.push)
+    if most.push > 0.0:
+        return most
+    return max(motions, key=lambda motion: motion.travel)
 
 
 def _with_command(entries: Mapping[int, Plain], joints: Sequence[int]) -> list[int]:
@@ -305,6 +282,7 @@ def _driven(
 def _turn_commands(
     entries: dict[int, Plain],
     motions: Mapping[int, JointMotion],
+    reach: Mapping[int, Limits],
     arm: Arm,
     reasons: list[str],
 ) -> list[int]:
@@ -316,7 +294,7 @@ def _turn_commands(
     wrong = list[int]()
     for joint, motion in motions.items():
         is_wrong = motion.contradicts(backward=joint in arm.backward)
-        reasons += _remarks(motion, arm.joint(joint), is_wrong)
+        reasons += _remarks(motion, reach[joint], arm.joint(joint), is_wrong)
         if is_wrong:
             entries[joint]["command"] = turned(entries[joint]["command"])
             wrong.append(joint)
@@ -419,20 +397,20 @@ def _refuse_rest(
     raise LogError(f"no joint is driven and moves: {what}", table.source, hint)
 
 
-def _remarks(motion: JointMotion, joint: Joint, wrong: bool) -> Iterator[str]:
-    angle = motion.log.angle_of(motion.joint)
+def _remarks(
+    motion: JointMotion, reach: Limits, joint: Joint, wrong: bool
+) -> Iterator[str]:
     if not joint.continuous:
-        yield from _beyond_range(angle, joint)
+        yield from _beyond_range(reach, joint)
     if wrong:
         _, against = motion.directed
         share = f"on {max(against, 1 - against):.0%} of its way"
         yield f"{joint.name} moves against its command ({share}): the command's sign is reversed"
 
 
-def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
-    """Yield that a joint's angles, (T,), are not those that the arm allows."""
-    low = angle.min()
-    high = angle.max()
+def _beyond_range(reach: Limits, joint: Joint) -> Iterator[str]:
+    """Yield that what a joint does in the logs is not what the arm allows."""
+    low, high = reach
     lowest, highest = joint.limits
     margin = angle_margin(lowest, highest)
     if low >= lowest - margin and high <= highest + margin:
@@ -441,7 +419,7 @@ def _beyond_range(angle: Array, joint: Joint) -> Iterator[str]:
     ends = f"{shown.in_setting(low):.4g} to {shown.in_setting(high):.4g}"
     allowed = f"{joint.range[0]:.6g} to {joint.range[1]:.6g}"
     yield (
-        f"{joint.name}: {shown.word}s in the log run from {ends} {shown.setting}, but the arm "
+        f"{joint.name}: {shown.word}s in the logs run from {ends} {shown.setting}, but the arm "
         f"allows {allowed}: correct their scale (-1 if they count backwards) and offset, or the "
         "range in arm.xml"
     )

@@ -23,12 +23,12 @@ LONGEST_PERIOD = 0.07
 
 
 def guessed_section(
-    table: Table, arm: Arm, order: Sequence[str], further: Sequence[Table] = ()
+    tables: Sequence[Table], arm: Arm, order: Sequence[str]
 ) -> ColumnGuess:
-    """Guess the columns; joints have the numbers of the arm.
+    """Guess the columns of the first of some logs; joints have the numbers of the arm.
 
     `order` are names of the arm's joints in the order of the log's numbers; none: the
-    arm's order. `further` tables tell what sensors without a scale reach, too.
+    arm's order.
     """
     names = arm.joint_names
     places = _places(names, order)
@@ -47,7 +47,7 @@ def guessed_section(
     links = [arm.link_names[place] for place in places]
     try:
         guess = guess_columns(
-            [table, *further],
+            tables,
             [names[place] for place in places],
             links=links,
             slides=slides,
@@ -55,7 +55,7 @@ def guessed_section(
             ranges=ranges,
         )
     except LogError:
-        if not holds_numbers(table):
+        if not holds_numbers(tables[0]):
             raise
         return ColumnGuess({"joints": {}}, (), ())
     section = guess.log

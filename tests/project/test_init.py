@@ -109,6 +109,33 @@ def test_a_joint_that_seldom_moves_is_sized_by_how_fast_it_moves(
         assert next(dampings) == pytest.approx(next(dampings), rel=0.3)
 
 
+@pytest.mark.parametrize("lever", ["0", "0.02"])
+def test_a_joint_that_stands_in_the_first_log_is_read_by_the_others(
+    lever: str, place: Path, tmp_path: Path
+):
+    """What its command is in, and which way it turns, only another log tells; its lever
+    may be noisy at rest [V]."""
+
+    def boom_stands(rows: list[list[str]]) -> None:
+        command, angle = (
+            rows[0].index(f"boom {what}") for what in ("valve [V]", "angle [rad]")
+        )
+        for k, row in enumerate(rows[1:]):
+            row[command], row[angle] = (lever if k % 7 == 0 else "0"), rows[1][angle]
+
+    first = renamed(place, tmp_path / "log.csv", boom_stands)
+    made = init(
+        tmp_path / "mine",
+        place / "mine" / "arm.yaml",
+        [first, place / "move_1.csv", place / "move_2.csv"],
+    )
+    boom = hydroid.load_settings(tmp_path / "mine" / "fit.yaml").log.columns(
+        "command", 2
+    )
+    assert boom.scale == -10
+    assert any("boom_joint moves against its command" in line for line in made.columns)
+
+
 def test_each_side_of_a_valve_starts_where_the_logs_show_it(place: Path):
     """The machine's valves have dead bands of 20 and 30 %; the boom's is wired the
     other way round."""

@@ -66,15 +66,15 @@ class Layout:
     """The columns of a log, as the `log` section of a fit's settings, and what its
     numbers say.
 
-    `outputs` are joints that a log drives and measures, `motions` how the measured ones
-    move in the log that tells most of it, by number from 1, and `valves` those by which
-    the outputs follow commands of the sign that these have in the section; `left_out`
-    are further logs that cannot be read by it; `reach`: the ends of what joints do in the others [rad, m]; `reasons`
-    have a line for each column that is not `unused`; `varied`: an engine's speed or an
-    oil's temperature of which the logs hold enough to tell its effect; `followed`: a joint that no
-    command drives moves. `missing` says
-    which columns a person must name, in a section that is then no more than a start;
-    `candidates` are lines about what each could be.
+    `outputs` are joints that a log drives and measures; `motions`: how the measured ones
+    move in the log that tells most of it, by number from 1; `valves`: those by which
+    the outputs follow commands of the sign that these have in the section; `left_out`:
+    further logs that cannot be read by it; `reach`: the ends of what joints do in the
+    others [rad, m]; `reasons` have a line for each column that is not `unused`;
+    `varied`: an engine's speed or an oil's temperature of which the logs hold enough to
+    tell its effect; `followed`: a joint that no command drives moves; `missing`: which
+    columns a person must name, in a section that is then no more than a start;
+    `candidates`: lines about what each could be.
     """
 
     section: Plain

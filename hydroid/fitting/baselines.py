@@ -80,6 +80,7 @@ class Baseline:
             self.delay / log.period,
             self.numbers[3] / log.period,
             log.start[self.joint - 1],
+            log.start_speed[self.joint - 1] * log.period,
             self.limits,
         )
 
@@ -99,25 +100,27 @@ def follow(
     delay: float,
     lag: Array,
     start: float,
+    speed: float,
     limits: Array,
 ) -> Array:
     """Return the angles of a joint whose speed follows `target` [rad/sample].
 
-    It follows after a delay, and with a lag for either side [samples].
+    It follows after a delay, and with a lag for either side [samples]. Of one that has a
+    speed at the start, the first target has been there before, too.
     """
     whole = int(delay)
     part = delay - whole
     # what remains of a difference of speeds after a sample
     left = [np.exp(-1.0 / time) if time > 1e-6 else 0.0 for time in lag]
     angle = start
-    speed = 0.0
+    held = target[0] if speed != 0.0 else 0.0
     angles = np.empty(len(target))
     for k in range(len(target)):
         angles[k] = angle
         now = k - whole
         before = now - 1
-        wanted = (1 - part) * target[now] if now >= 0 else 0.0
-        wanted += part * target[before] if before >= 0 else 0.0
+        wanted = (1 - part) * (target[now] if now >= 0 else held)
+        wanted += part * (target[before] if before >= 0 else held)
         way = side[max(now, 0)]
         # the integral of a speed that approaches the wanted one over this sample
         angle += wanted + (speed - wanted) * lag[way] * (1 - left[way])

@@ -222,7 +222,10 @@ class _Following:
         reach = (float(every.min()), float(every.max()))
         self._used = [inside(angle, reach) for angle in angles]
         # to find where a log rests takes as long as to follow it
-        self._starts = [float(log.start[column]) for log in self._logs]
+        self._starts = [
+            (float(log.start[column]), float(log.start_speed[column] * log.period))
+            for log in self._logs
+        ]
         self._noise = 1.0
 
     def fitted(self, delay: float) -> JointStart:
@@ -286,7 +289,7 @@ class _Following:
             delay = x[-2] / log.period
             lag = np.full(2, x[-1] / log.period)
             way = self._speeds(x, command, is_back) * log.period
-            angle = follow(way, is_back.astype(int), delay, lag, start, FREE)
+            angle = follow(way, is_back.astype(int), delay, lag, *start, FREE)
             error = log.angle[:, self._column] - angle
             kept = np.exp(-log.period / MEMORY)
             change = np.where(used, np.diff(error, prepend=error[0]), 0.0)

@@ -19,6 +19,12 @@ LEAST_COMMAND = 2.0
 """below which a command is none, but the noise of a lever [%]"""
 STANDS = 2e-3
 """between the halves of a rest in which a joint stands its mean moves less [rad, m]"""
+BEGINNING = 0.2
+"""in which a joint shows whether it moves already where a log begins [s]"""
+SURELY = 5.0
+"""standard deviations of a speed from which a joint moves"""
+MOVES = 0.2
+"""part of its fastest speed from which it does"""
 LEVELS: tuple[Level, ...] = ("error", "warning", "note")
 
 
@@ -175,6 +181,28 @@ class Log:
         begins with a command the first sample must do.
         """
         return self._with_pose(self._mean_at_rest(self.angle))
+
+    @cached_property
+    def start_speed(self) -> Array:
+        """Speeds of joints that move already where the log begins, under a command
+        [rad/s], shape (J,): their valves have been open for a while. 0 of the others.
+        """
+        count = max(round(BEGINNING / self.period), 2) + 1
+        if len(self.time) <= count:
+            return np.zeros(self.joints)
+        begun = self.angle[:count]
+        # a straight line through the first samples, and what is left of them
+        places = np.arange(count) - (count - 1) / 2
+        squares = places @ places
+        slope = places @ begun / squares  # [rad] a sample
+        left = begun - begun.mean(axis=0) - np.outer(places, slope)
+        uncertain = np.sqrt(np.sum(left**2, axis=0) / ((count - 2) * squares))
+        ways = np.abs(self.angle[count:] - self.angle[:-count])
+        fastest = ways.max(axis=0) / count
+        # comparisons with NaN, of joints that are not measured, are false
+        moves = np.abs(slope) > np.maximum(SURELY * uncertain, MOVES * fastest)
+        moves &= np.abs(self.command[0]) >= LEAST_COMMAND
+        return np.where(moves, slope / self.period, 0.0)
 
     @property
     def start_pressure(self) -> Array:

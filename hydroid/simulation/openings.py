@@ -18,11 +18,18 @@ import numpy as np
 from numba import njit
 
 from hydroid.arrays import Array, Structs
-from hydroid.hydraulics.joint import command, move_plunger, spool_opening
+from hydroid.hydraulics.joint import (
+    command,
+    mean_opening,
+    move_plunger,
+    spool_opening,
+)
 from hydroid.hydraulics.kernel import SOURCE, Plugin
 from hydroid.hydraulics.records import SCRATCH
 from hydroid.hydraulics.valve import KNOTS
 
+HELD = 4.0
+"""after which a valve has settled under a command [s]: lags are 0.6 s at most"""
 Run = Callable[..., Iterable[None]]
 """a pool's: runs a function for each of some values, maybe at the same time"""
 BEHIND_VALVE = [
@@ -96,6 +103,35 @@ def _open(
         for i in range(valve.substeps):
             net += spool_opening(c, z, strokes_a[k, i] - strokes_b[k, i])
         opening[k] = net / valve.substeps
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _hold(plugin: Plugin, state, held, steps: int, source: int = SOURCE) -> None:
+    """Advance the valves of one candidate's driven joints, in state, (J,), under
+    commands that are held [%], (past + 1, J), for some steps."""
+    pad = np.zeros(1, SCRATCH)
+    for a in range(plugin.idle, plugin.order.size):
+        j = plugin.order[a]
+        if held[0, j] != 0.0:
+            for _ in range(steps):
+                mean_opening(
+                    plugin.coefficients[j],
+                    state[j],
+                    pad[0],
+                    held[:, j],
+                    held.shape[0] - 1,
+                    plugin,
+                )
+
+
+def hold_valves(plugin: Plugin, states: Structs, command: Array) -> None:
+    """Let the valves of n candidates settle under commands [%], (J,), held for HELD:
+    changes their states at rest, (n, J), of joints whose command is not 0."""
+    if not command.any():
+        return
+    held = np.tile(command, (plugin.past + 1, 1))
+    for i, state in enumerate(states):
+        _hold(plugin.candidate(i), state, held, round(HELD / plugin.period))
 
 
 def _valves(coefficients: Structs) -> Structs:

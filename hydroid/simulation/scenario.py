@@ -195,6 +195,9 @@ class Scenario:
         arm: the arm reduced to its V moving joints, springs slack in the start pose.
         roles: of the arm's joints.
         outputs: columns of the outputs among the moving joints, shape (K,).
+        speed: of joints that move already where the log begins [rad/s], shape (V,); 0
+            of the others.
+        before: the commands that have been held then [%], shape (V,); 0 of the others.
         command: held during each step [%], shape (steps, V).
         beside: the same of the joints that follow the log, shape (steps, P), or (steps,
             0) where they have none.
@@ -226,6 +229,9 @@ class Scenario:
         self.arm.model.opt.timestep = log.period / stepping.steps
         self.arm.model.qpos_spring[:] = self.arm.pose
         self.outputs = np.searchsorted(self.arm.columns, outputs)
+        driven = log.driven[moving] & ~self.roles.following[moving]
+        self.speed = np.where(driven, log.start_speed[moving], 0.0)
+        self.before = np.where(self.speed != 0.0, log.command[0, moving], 0.0)
         # the last command acts only after the last sample
         self.command = np.repeat(log.command[:-1, moving], stepping.steps, axis=0)
         self.beside = np.zeros((len(self.command), 0))
@@ -259,6 +265,8 @@ class Scenario:
         """
         other = copy(self)
         other.arm = replace(self.arm, pose=start)
+        other.speed = np.zeros(len(start))
+        other.before = np.zeros(len(start))
         other.command = command
         other.conditions = AT_REFERENCES
         return other

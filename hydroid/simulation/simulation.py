@@ -31,7 +31,7 @@ from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation.openings import Run, valve_openings
+from hydroid.simulation.openings import Run, hold_valves, valve_openings
 from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
@@ -251,8 +251,12 @@ class Simulation:
         pose = scenario.arm.pose
         balance = self._balance(arm, values, pose)
         plugin, states = chain.start(candidates, pose, balance, scenario.pressure)
-        before = np.zeros((plugin.past, len(chain.columns)))
-        commands = np.concatenate([before, scenario.command[:, chain.columns]])
+        before = scenario.before[chain.columns]
+        hold_valves(plugin, states, before)
+        for field in ("velocity", "turning"):
+            states[field] = scenario.speed[chain.columns]
+        past = np.tile(before, (plugin.past, 1))
+        commands = np.concatenate([past, scenario.command[:, chain.columns]])
         openings = [np.empty((0, 0))] * n
         # what the valves do is seen in their states alone
         if self._at_once and not self._pressures.size:
@@ -304,6 +308,7 @@ class Simulation:
         row = some[0]
         start = np.tile(scenario.arm.pose, arm.copies)
         arm.start(ready.values, some, start)
+        arm.data.qvel[:] = np.tile(scenario.speed, arm.copies)
         torque = self._pushing(ready.gain[some], ready.balance[some])
         actuators = ready.plugin.candidate(row)
         state = ready.states[row]

@@ -23,6 +23,8 @@ BEGINNING = 0.2
 """in which a joint shows whether it moves already where a log begins [s]"""
 SURELY = 5.0
 """standard deviations of a speed from which a joint moves"""
+STEADY = 0.7
+"""part of the speed in the second half of that time that it has in the first"""
 MOVES = 0.2
 """part of its fastest speed from which it does"""
 LEVELS: tuple[Level, ...] = ("error", "warning", "note")
@@ -187,7 +189,7 @@ class Log:
         """Speeds of joints that move already where the log begins, under a command
         [rad/s], shape (J,): their valves have been open for a while. 0 of the others.
         """
-        count = max(round(BEGINNING / self.period), 2) + 1
+        count = max(round(BEGINNING / self.period), 4) + 1
         if len(self.time) <= count:
             return np.zeros(self.joints)
         begun = self.angle[:count]
@@ -201,6 +203,11 @@ class Log:
         fastest = ways.max(axis=0) / count
         # comparisons with NaN, of joints that are not measured, are false
         moves = np.abs(slope) > np.maximum(SURELY * uncertain, MOVES * fastest)
+        # it does not begin to move then: it is about as fast in the first half
+        middle = (count - 1) // 2
+        earlier = (begun[middle] - begun[0]) / middle
+        later = (begun[-1] - begun[middle]) / (count - 1 - middle)
+        moves &= earlier * np.sign(slope) > STEADY * later * np.sign(slope)
         moves &= np.abs(self.command[0]) >= LEAST_COMMAND
         return np.where(moves, slope / self.period, 0.0)
 

@@ -155,11 +155,6 @@ class JointStart:
     direction: float
 
     @property
-    def speed(self) -> float:
-        """At full command, the mean of both directions [rad/s]."""
-        return (self.sides[0].speed + self.sides[1].speed) / 2
-
-    @property
     def turned(self) -> "JointStart":
         """The same for commands of the other sign."""
         return replace(self, sides=self.sides[::-1], direction=-self.direction)

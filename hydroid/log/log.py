@@ -23,8 +23,9 @@ BEGINNING = 0.2
 """in which a joint shows whether it moves already where a log begins [s]"""
 SURELY = 5.0
 """standard deviations of a speed from which a joint moves"""
-STEADY = 0.7
-"""part of the speed in the second half of that time that it has in the first"""
+LATE = 0.01
+"""after the log's begin, up to which a joint may begin to move that has moved before
+[s]"""
 MOVES = 0.2
 """part of its fastest speed from which it does"""
 LEVELS: tuple[Level, ...] = ("error", "warning", "note")
@@ -66,6 +67,7 @@ class Log:
         pose: in which joints stand that are not measured [rad], shape (J,); None: it is
             not known.
         begin: time of its first sample in the recording, of which it may be a part [s].
+        in_motion: whether joints may move already where it begins.
         conditions: engine speed over its reference, and how much warmer the oil is than
             at its own [K], shape (T, 2); 1 and 0 where the log has no such column. None:
             it has neither.
@@ -86,6 +88,7 @@ class Log:
     recorded: Mask | None = None
     pose: Array | None = None
     begin: float = 0.0
+    in_motion: bool = False
     clock: str = ""
     conditions: Array | None = None
     beside: Array | None = None
@@ -184,32 +187,36 @@ class Log:
         """
         return self._with_pose(self._mean_at_rest(self.angle))
 
-    @cached_property
+    @property
     def start_speed(self) -> Array:
-        """Speeds of joints that move already where the log begins, under a command
-        [rad/s], shape (J,): their valves have been open for a while. 0 of the others.
+        """At which joints start [rad/s], shape (J,): 0 of a log that begins at rest."""
+        return self.seen_at_first if self.in_motion else np.zeros(self.joints)
+
+    @cached_property
+    def seen_at_first(self) -> Array:
+        """Speeds of joints that seem to move already where the log begins, under a
+        command [rad/s], shape (J,); 0 of the others.
+
+        One that only begins to move there is late: the straight line that it follows
+        then leads back to its first angle at a later time.
         """
         count = max(round(BEGINNING / self.period), 4) + 1
         if len(self.time) <= count:
             return np.zeros(self.joints)
         begun = self.angle[:count]
-        # a straight line through the first samples, and what is left of them
-        places = np.arange(count) - (count - 1) / 2
-        squares = places @ places
-        slope = places @ begun / squares  # [rad] a sample
-        left = begun - begun.mean(axis=0) - np.outer(places, slope)
-        uncertain = np.sqrt(np.sum(left**2, axis=0) / ((count - 2) * squares))
+        speed, _, noise, uncertain = _line(begun)
         ways = np.abs(self.angle[count:] - self.angle[:-count])
         fastest = ways.max(axis=0) / count
         # comparisons with NaN, of joints that are not measured, are false
-        moves = np.abs(slope) > np.maximum(SURELY * uncertain, MOVES * fastest)
-        # it does not begin to move then: it is about as fast in the first half
-        middle = (count - 1) // 2
-        earlier = (begun[middle] - begun[0]) / middle
-        later = (begun[-1] - begun[middle]) / (count - 1 - middle)
-        moves &= earlier * np.sign(slope) > STEADY * later * np.sign(slope)
+        moves = np.abs(speed) > np.maximum(SURELY * uncertain, MOVES * fastest)
+        half = count // 2
+        later, middle, _, _ = _line(begun[half:])
+        with np.errstate(all="ignore"):
+            late = half + (count - half - 1) / 2 - (middle - begun[0]) / later
+            chance = 2 * noise / np.abs(speed)
+        moves &= late * self.period <= np.maximum(LATE, chance * self.period)
         moves &= np.abs(self.command[0]) >= LEAST_COMMAND
-        return np.where(moves, slope / self.period, 0.0)
+        return np.where(moves, speed / self.period, 0.0)
 
     @property
     def start_pressure(self) -> Array:
@@ -285,6 +292,19 @@ class Log:
         resting = self._at_rest(signal)
         # of equal values to the last bit
         return resting[0] + (resting - resting[0]).mean(axis=0)
+
+
+def _line(angles: Array) -> tuple[Array, Array, Array, Array]:
+    """Fit lines to samples, (n, J); their slopes [rad/sample], means, what is left as a
+    standard deviation, and that of the slopes, (J,) each."""
+    count = len(angles)
+    places = np.arange(count) - (count - 1) / 2
+    squares = places @ places
+    slope = places @ angles / squares
+    mean = angles.mean(axis=0)
+    left = angles - mean - np.outer(places, slope)
+    noise = np.sqrt(np.sum(left**2, axis=0) / (count - 2))
+    return slope, mean, noise, noise / np.sqrt(squares)
 
 
 @dataclass(frozen=True)

@@ -91,13 +91,6 @@ class Layout:
     missing: str = ""
     candidates: tuple[str, ...] = ()
 
-    @property
-    def speeds(self) -> Mapping[int, float]:
-        """How fast joints are at full command, by number from 1 [rad/s, m/s]; of those
-        whose valve is not known, how fast they move."""
-        seen = {joint: motion.speed for joint, motion in self.motions.items()}
-        return seen | {joint: valve.speed for joint, valve in self.valves.items()}
-
 
 def find_layout(
     table: Table | None,
@@ -183,6 +176,8 @@ def _seen(
         )
         logs += fitted
         varied = tuple(name for name in EFFECTS if varies(logs, name))
+        if origin == GUESSED:
+            reasons += _begin_in_motion(guess.log, logs, arm.joint_names)
         reach = reach_of([*logs, *unseen], measured)
         motions = {joint: _telling(logs, joint) for joint in measured}
         _refuse_rest(table, driven, logs, arm.joint_names)
@@ -205,6 +200,17 @@ def _seen(
         origin=origin,
         varied=varied,
     )
+
+
+def _begin_in_motion(
+    section: Plain, logs: Sequence[Log], names: Sequence[str]
+) -> Iterator[str]:
+    """Let logs begin in motion where joints move at once, and say so."""
+    moving = sum((log.seen_at_first != 0.0).astype(int) for log in logs)
+    joints = [name for name, count in zip(names, moving, strict=True) if count]
+    if joints:
+        section["begins_in_motion"] = True
+        yield f"{listed(joints)}: in motion already where a log begins (begins_in_motion)"
 
 
 def _telling(logs: Sequence[Log], joint: int) -> JointMotion:

@@ -158,7 +158,9 @@ def _arm_of_boxes(
 
 def _sizes(arm: Arm, layout: Layout) -> tuple[JointSize, ...]:
     """Return the sizes of what moves the joints, by the speeds that the logs show."""
-    return joint_sizes(arm, layout.speeds)
+    return joint_sizes(
+        arm, {joint: motion.speed for joint, motion in layout.motions.items()}
+    )
 
 
 def _stand_ins(arm: Arm) -> Iterator[str]:

@@ -299,7 +299,7 @@ def fit_text(
         substeps=math.ceil(period / steps / VALVE_STEP - 1e-9),
         volume=short(min(volumes, default=50.0)),
         most=short(10 * drawn),  # so large that it hardly matters
-        felt=short(3 * drawn),
+        felt=short(4 * drawn),
         joints=joints,
     )
 

@@ -49,6 +49,8 @@ REVERSED = (
     "way instead (compare arm.png), set scale: -1 at its angle and not at its command: gravity "
     "follows the angle"
 )
+LATE = 0.03
+"""behind its command, from which a joint that moves at once has moved before [s]"""
 LACKING = {
     (True, False): "no angle found for {}: simulated by the command, and compared with "
     "nothing. If a column holds the angle, name it in fit.yaml (log.joints)",
@@ -176,15 +178,15 @@ def _seen(
         )
         logs += fitted
         varied = tuple(name for name in EFFECTS if varies(logs, name))
-        if origin == GUESSED:
-            reasons += _begin_in_motion(guess.log, logs, arm.joint_names)
         reach = reach_of([*logs, *unseen], measured)
         motions = {joint: _telling(logs, joint) for joint in measured}
         _refuse_rest(table, driven, logs, arm.joint_names)
         driven = _driven(driven, logs, arm.joint_names, reasons)
     wrong = _turn_commands(entries, motions, reach, arm, reasons)
     reasons += _lacking(entries, arm.joint_names)
+    valves = _valves(logs, driven, wrong, progress)
     if origin == GUESSED:
+        reasons += _begin_in_motion(guess.log, logs, valves, arm.joint_names)
         _forget_standing(entries, measured, logs)
     undriven = [motion for joint, motion in motions.items() if joint not in driven]
     return Layout(
@@ -194,7 +196,7 @@ def _seen(
         guess.unused,
         motions,
         followed=any(motion.travel > FOLLOWED for motion in undriven),
-        valves=_valves(logs, driven, wrong, progress),
+        valves=valves,
         left_out=tuple(left_out),
         reach=reach,
         origin=origin,
@@ -203,11 +205,18 @@ def _seen(
 
 
 def _begin_in_motion(
-    section: Plain, logs: Sequence[Log], names: Sequence[str]
+    section: Plain,
+    logs: Sequence[Log],
+    valves: Mapping[int, JointStart],
+    names: Sequence[str],
 ) -> Iterator[str]:
-    """Let logs begin in motion where joints move at once, and say so."""
-    moving = sum((log.seen_at_first != 0.0).astype(int) for log in logs)
-    joints = [name for name, count in zip(names, moving, strict=True) if count]
+    """Let logs begin in motion where joints seem to, and say so; one that is never late
+    moves at once from rest."""
+    joints = list[str]()
+    for joint, valve in valves.items():
+        begins = any(log.seen_at_first[joint - 1] for log in logs)
+        if begins and valve.delay + valve.lag > LATE:
+            joints.append(names[joint - 1])
     if joints:
         section["begins_in_motion"] = True
         yield f"{listed(joints)}: in motion already where a log begins (begins_in_motion)"

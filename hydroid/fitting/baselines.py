@@ -100,20 +100,21 @@ def follow(
     delay: float,
     lag: Array,
     start: float,
-    speed: float,
+    begun: float,
     limits: Array,
 ) -> Array:
     """Return the angles of a joint whose speed follows `target` [rad/sample].
 
-    It follows after a delay, and with a lag for either side [samples]. Of one that has a
-    speed at the start, the first target has been there before, too.
+    It follows after a delay, and with a lag for either side [samples]. Where it has
+    `begun` to move before the start, the first target has been held before.
     """
     whole = int(delay)
     part = delay - whole
     # what remains of a difference of speeds after a sample
     left = [np.exp(-1.0 / time) if time > 1e-6 else 0.0 for time in lag]
     angle = start
-    held = target[0] if speed != 0.0 else 0.0
+    speed = begun
+    held = target[0] if begun != 0.0 else 0.0
     angles = np.empty(len(target))
     for k in range(len(target)):
         angles[k] = angle

@@ -217,9 +217,10 @@ class _Following:
         reach = (float(every.min()), float(every.max()))
         self._used = [inside(angle, reach) for angle in angles]
         # to find where a log rests takes as long as to follow it
-        self._starts = [
-            (float(log.start[column]), float(log.start_speed[column] * log.period))
-            for log in self._logs
+        self._starts = [float(log.start[column]) for log in self._logs]
+        # [rad/sample]
+        self._speeds_at_start = [
+            float(log.start_speed[column] * log.period) for log in self._logs
         ]
         self._noise = 1.0
 
@@ -276,15 +277,17 @@ class _Following:
         """Return what has changed of the errors within MEMORY [rad], but near the ends
         of the travel, shape (T,)."""
         errors = list[Array]()
-        every = zip(self._logs, self._used, self._starts, strict=True)
-        for log, used, start in every:
+        every = zip(
+            self._logs, self._used, self._starts, self._speeds_at_start, strict=True
+        )
+        for log, used, start, begun in every:
             command = log.command[:, self._column]
             is_back = command < 0
             # in samples
             delay = x[-2] / log.period
             lag = np.full(2, x[-1] / log.period)
             way = self._speeds(x, command, is_back) * log.period
-            angle = follow(way, is_back.astype(int), delay, lag, *start, FREE)
+            angle = follow(way, is_back.astype(int), delay, lag, start, begun, FREE)
             error = log.angle[:, self._column] - angle
             kept = np.exp(-log.period / MEMORY)
             change = np.where(used, np.diff(error, prepend=error[0]), 0.0)

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,12 +21,13 @@ LEAST_COMMAND = 2.0
 STANDS = 2e-3
 """between the halves of a rest in which a joint stands its mean moves less [rad, m]"""
 BEGINNING = 0.2
-"""in which a joint shows whether it moves already where a log begins [s]"""
+"""in which a joint shows whether it moves already where a log begins [s]; four samples
+at least"""
 SURELY = 5.0
 """standard deviations of a speed from which a joint moves"""
 LATE = 0.01
-"""after the log's begin, up to which a joint may begin to move that has moved before
-[s]"""
+"""by which a joint may seem to begin to move after the first sample, though it has
+moved before [s]"""
 MOVES = 0.2
 """part of its fastest speed from which it does"""
 LEVELS: tuple[Level, ...] = ("error", "warning", "note")
@@ -67,7 +69,7 @@ class Log:
         pose: in which joints stand that are not measured [rad], shape (J,); None: it is
             not known.
         begin: time of its first sample in the recording, of which it may be a part [s].
-        in_motion: whether joints may move already where it begins.
+        speed: at which joints start [rad/s], shape (J,); None: at rest.
         conditions: engine speed over its reference, and how much warmer the oil is than
             at its own [K], shape (T, 2); 1 and 0 where the log has no such column. None:
             it has neither.
@@ -88,7 +90,7 @@ class Log:
     recorded: Mask | None = None
     pose: Array | None = None
     begin: float = 0.0
-    in_motion: bool = False
+    speed: Array | None = None
     clock: str = ""
     conditions: Array | None = None
     beside: Array | None = None
@@ -189,34 +191,41 @@ class Log:
 
     @property
     def start_speed(self) -> Array:
-        """At which joints start [rad/s], shape (J,): 0 of a log that begins at rest."""
-        return self.seen_at_first if self.in_motion else np.zeros(self.joints)
+        """At which joints start [rad/s], shape (J,)."""
+        return np.zeros(self.joints) if self.speed is None else self.speed
 
     @cached_property
-    def seen_at_first(self) -> Array:
+    def speed_at_first(self) -> Array:
         """Speeds of joints that seem to move already where the log begins, under a
         command [rad/s], shape (J,); 0 of the others.
 
-        One that only begins to move there is late: the straight line that it follows
-        then leads back to its first angle at a later time.
+        The straight line that such a joint follows leads back to its first angle at
+        the first sample. If the joint only begins to move then, it does so later.
         """
         count = max(round(BEGINNING / self.period), 4) + 1
         if len(self.time) <= count:
             return np.zeros(self.joints)
         begun = self.angle[:count]
-        speed, _, noise, uncertain = _line(begun)
+        whole = _line(begun)
         ways = np.abs(self.angle[count:] - self.angle[:-count])
         fastest = ways.max(axis=0) / count
         # comparisons with NaN, of joints that are not measured, are false
-        moves = np.abs(speed) > np.maximum(SURELY * uncertain, MOVES * fastest)
+        least = np.maximum(SURELY * whole.slope_sd, MOVES * fastest)
+        moves = np.abs(whole.slope) > least
         half = count // 2
-        later, middle, _, _ = _line(begun[half:])
+        later = _line(begun[half:])
+        moves &= later.slope * whole.slope > 0.0
         with np.errstate(all="ignore"):
-            late = half + (count - half - 1) / 2 - (middle - begun[0]) / later
-            chance = 2 * noise / np.abs(speed)
-        moves &= late * self.period <= np.maximum(LATE, chance * self.period)
+            back = (later.mean - begun[0]) / later.slope
+            late = self.period * (half + (count - half - 1) / 2 - back)
+            chance = self.period * 2 * whole.noise / np.abs(whole.slope)
+        moves &= late <= np.maximum(LATE, chance)
         moves &= np.abs(self.command[0]) >= LEAST_COMMAND
-        return np.where(moves, speed / self.period, 0.0)
+        return np.where(moves, whole.slope / self.period, 0.0)
+
+    def in_motion(self) -> "Log":
+        """Return the log with joints that start at their speed at first."""
+        return replace(self, speed=self.speed_at_first)
 
     @property
     def start_pressure(self) -> Array:
@@ -275,6 +284,8 @@ class Log:
             part = replace(part, beside=self.beside[samples])
         if self.recorded is not None:
             part = replace(part, recorded=self.recorded[samples])
+        if self.speed is not None and first > 0:
+            part = part.in_motion()
         return part
 
     @property
@@ -294,9 +305,18 @@ class Log:
         return resting[0] + (resting - resting[0]).mean(axis=0)
 
 
-def _line(angles: Array) -> tuple[Array, Array, Array, Array]:
-    """Fit lines to samples, (n, J); their slopes [rad/sample], means, what is left as a
-    standard deviation, and that of the slopes, (J,) each."""
+class _Line(NamedTuple):
+    """A line through samples: slope [rad/sample], mean, standard deviation of what is
+    left, and of the slope, (J,) each."""
+
+    slope: Array
+    mean: Array
+    noise: Array
+    slope_sd: Array
+
+
+def _line(angles: Array) -> _Line:
+    """Return the lines through the samples of joints, (n, J)."""
     count = len(angles)
     places = np.arange(count) - (count - 1) / 2
     squares = places @ places
@@ -304,7 +324,7 @@ def _line(angles: Array) -> tuple[Array, Array, Array, Array]:
     mean = angles.mean(axis=0)
     left = angles - mean - np.outer(places, slope)
     noise = np.sqrt(np.sum(left**2, axis=0) / (count - 2))
-    return slope, mean, noise, noise / np.sqrt(squares)
+    return _Line(slope, mean, noise, noise / np.sqrt(squares))
 
 
 @dataclass(frozen=True)

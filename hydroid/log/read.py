@@ -239,9 +239,10 @@ def _parts(
         source = log.source if len(pieces) == 1 else f"{log.source}[{number}]"
         rows = log.rows and replace(log.rows, left_out=left_out)
         place = {"source": source, "begin": begin, "rest": rest}
-        in_motion = begin > 0.0 or settings.begins_in_motion
-        of_file = {"clock": recording.clock, "rows": rows, "in_motion": in_motion}
-        parts.append(replace(log, **place, **of_file))
+        part = replace(log, **place, clock=recording.clock, rows=rows)
+        if begin or settings.begins_in_motion:
+            part = part.in_motion()
+        parts.append(part)
     return parts
 
 

@@ -49,8 +49,9 @@ REVERSED = (
     "way instead (compare arm.png), set scale: -1 at its angle and not at its command: gravity "
     "follows the angle"
 )
-LATE = 0.03
-"""behind its command, from which a joint that moves at once has moved before [s]"""
+QUICKEST = 0.03
+"""delay and lag of a joint of which the first samples tell whether it begins at rest
+[s]"""
 LACKING = {
     (True, False): "no angle found for {}: simulated by the command, and compared with "
     "nothing. If a column holds the angle, name it in fit.yaml (log.joints)",
@@ -210,12 +211,15 @@ def _begin_in_motion(
     valves: Mapping[int, JointStart],
     names: Sequence[str],
 ) -> Iterator[str]:
-    """Let logs begin in motion where joints seem to, and say so; one that is never late
-    moves at once from rest."""
+    """Let logs begin in motion where joints seem to, and say so.
+
+    A joint without a delay or a lag also moves at once if it begins at rest.
+    """
     joints = list[str]()
     for joint, valve in valves.items():
-        begins = any(log.seen_at_first[joint - 1] for log in logs)
-        if begins and valve.delay + valve.lag > LATE:
+        # parts behind a gap may always do
+        begins = any(log.speed_at_first[joint - 1] for log in logs if not log.begin)
+        if begins and valve.delay + valve.lag > QUICKEST:
             joints.append(names[joint - 1])
     if joints:
         section["begins_in_motion"] = True

@@ -260,8 +260,9 @@ class LogSettings(Settings):
     sample to sample"""
     begins_in_motion: bool = False
     """whether joints may move already where logs begin: one that moves steadily in the
-    first 0.2 s, under a command, then starts at its speed, as if its first command had
-    been held before. Parts of a log behind a gap always do"""
+    first 0.2 s (or four samples), under a command, then starts at its speed, as if its
+    first command had been held before. Parts of a log behind a gap always do; with
+    `delay_s` none does"""
     delay_s: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """transport delay: commands act this much later than logged [s]"""
     groups: dict[

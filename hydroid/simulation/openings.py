@@ -29,7 +29,7 @@ from hydroid.hydraulics.records import SCRATCH
 from hydroid.hydraulics.valve import KNOTS
 
 HELD = 4.0
-"""after which a valve has settled under a command [s]: lags are 0.6 s at most"""
+"""for which a command has been held before a log that begins in motion [s]"""
 Run = Callable[..., Iterable[None]]
 """a pool's: runs a function for each of some values, maybe at the same time"""
 BEHIND_VALVE = [

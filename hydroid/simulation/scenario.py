@@ -185,7 +185,7 @@ class Response:
 
 class Scenario:
     """A log made ready for simulation: its commands drive, from the pose in which it
-    rests before them.
+    begins.
 
     Joints that the log drives, and `outputs` (0-based), whose angles are wanted, are
     *active*. A setting says what the others do (`simulation.roles`).

@@ -2,8 +2,8 @@
 
 Stage 1 takes the hydraulics for a gain, tau = K u + tau0 on every driven joint (article
 section 3), stage 2 steps the whole chain from command to torque on every active joint
-(`hydroid.simulation.scenario`). Every candidate starts at rest in the log's first pose,
-in static balance with gravity: its springs are slack there, and its oil, or in stage 1
+(`hydroid.simulation.scenario`). Every candidate starts in the log's first pose,
+at rest or in motion, in static balance with gravity: its springs are slack there, and its oil, or in stage 1
 a constant torque tau0 = g(q0), holds it. Each is rolled out by compiled code, as many
 at a time as there are threads; candidates are independent, and no number of threads
 changes a bit.
@@ -31,7 +31,7 @@ from hydroid.hydraulics.records import JOINT_STATE, has_force_curve
 from hydroid.log import Log
 from hydroid.mjcf import quiet_mujoco
 from hydroid.settings.fit import FitSettings
-from hydroid.simulation.openings import Run, hold_valves, valve_openings
+from hydroid.simulation.openings import HELD, Run, hold_valves, valve_openings
 from hydroid.simulation.rollout import Course, SteppedArm, Trace, compile_rollout
 from hydroid.simulation.scenario import Candidates, Chain, Response, Scenario, distinct
 
@@ -190,7 +190,9 @@ class Simulation:
         # copies beyond `some` only fill the arm
         for candidate, turned in zip(some, outputs, strict=False):
             if self.joints.size:
-                turned = reading(turned, ready.sensors[candidate], scenario.period)
+                speed = scenario.speed[scenario.outputs]
+                sensors = ready.sensors[candidate]
+                turned = reading(turned, sensors, scenario.period, speed)
             response.angle[rows[candidate]] = turned
         if oil is not None:
             row = rows[some[0]]
@@ -255,6 +257,10 @@ class Simulation:
         hold_valves(plugin, states, before)
         for field in ("velocity", "turning"):
             states[field] = scenario.speed[chain.columns]
+        if before.any():
+            # the pump has come up
+            states["share"] = 1.0
+            states["demand"] = HELD
         past = np.tile(before, (plugin.past, 1))
         commands = np.concatenate([past, scenario.command[:, chain.columns]])
         openings = [np.empty((0, 0))] * n
@@ -404,13 +410,14 @@ def _oil(actuators: Plugin, history: Structs, angle: Array) -> Oil:
     return Oil(pressures(coefficients, history, angle), flow, line)
 
 
-def reading(angle: Array, sensors: Structs, period: float) -> Array:
+def reading(angle: Array, sensors: Structs, period: float, speed: Array) -> Array:
     """Return what the sensors of K joints read, shape (T, K) like their angles [rad],
     `period` [s] apart.
 
     That is the turn since the start times a scale, with a first-order lag (ours).
     Between samples an angle is taken for a straight line. A reading starts at the
-    angle, at rest. With scale 1 and no lag it is the angle, to the bit.
+    angle, which has had a speed before [rad/s], (K,). With scale 1 and no lag it is the
+    angle, to the bit.
     """
     scale = sensors["sensor_scale"]
     lag = sensors["sensor_lag"]
@@ -422,5 +429,11 @@ def reading(angle: Array, sensors: Structs, period: float) -> Array:
         mean = (1.0 - left) * lag[k] / period
         # exact for an input on straight lines: of this sample, and of the one before
         inputs = [1.0 - mean, mean - left]
-        turned[:, k] = lfilter(inputs, [1.0, -left], turned[:, k])
+        # while it turned steadily, the sensor read what it had been a lag earlier
+        ahead = scale[k] * speed[k] * lag[k]
+        step = scale[k] * speed[k] * period
+        before = inputs[1] * (ahead - step) - left * step
+        turned[:, k], _ = lfilter(
+            inputs, [1.0, -left], turned[:, k] + ahead, zi=[before]
+        )
     return angle[0] + turned

@@ -45,7 +45,7 @@ def recording(arm, simulate, model, **values):
     log = at_rest(arm.pose("study"), command, PERIOD)
     angle = log.angle.copy()
     angle[:, [SHOULDER, ROLL]] = simulate(log, model, **values)
-    return replace(log, angle=angle, in_motion=True)
+    return replace(log, angle=angle, speed=np.zeros(len(arm.joints)))
 
 
 @pytest.mark.parametrize(
@@ -54,6 +54,16 @@ def recording(arm, simulate, model, **values):
         ("quasi-static", {}),
         ("quasi-static", {"lag_of_speed": 1.0}),
         ("quasi-static", {"oil_frequency": 12.0, "oil_damping": 0.3}),
+        ("quasi-static", {"sensor_lag": 0.2}),
+        (
+            "quasi-static",
+            {
+                "pump_flow": 4e-5,
+                "pump_droop": 60e5,
+                "pump_idle": 0.2,
+                "pump_delay": 0.3,
+            },
+        ),
         ("dynamic", {}),
         ("dynamic", {"lag_of_speed": 1.0}),
     ],
@@ -70,8 +80,7 @@ def test_a_part_goes_on_as_the_whole_does(model, more, arm, simulate):
     most = 0.06 if model == "dynamic" else 0.02
     assert np.all(np.abs(found - true).max(axis=0) < most * way)
     # as if it began at rest, it comes too late
-    resting = replace(part, angle=np.tile(part.angle[:1], (len(part.time), 1)))
-    late = simulate(resting, model, **values)
+    late = simulate(replace(part, speed=None), model, **values)
     assert np.all(np.abs(late - true).max(axis=0) > 0.1 * way)
 
 
@@ -98,8 +107,17 @@ def test_a_joint_that_begins_to_move_is_not_in_motion(period, late):
         noise = 1e-3 * np.random.default_rng(seed).normal(size=len(time))
         angle = 0.3 * np.maximum(time - late, 0.0) + noise
         log = Log("a", time, command, angle[:, None], period)
-        found.append(bool(log.seen_at_first.any()))
+        found.append(bool(log.speed_at_first.any()))
     assert np.mean(found) <= 0.02
+
+
+def test_a_prefix_starts_as_the_whole_and_a_part_as_it_moves(arm, simulate):
+    whole = recording(arm, simulate, "quasi-static", **LAGS)
+    moving = whole.part(200, 300)
+    assert np.array_equal(moving.first(0.1).start_speed, moving.start_speed)
+    later = moving.part(30, 100)
+    assert later.start_speed[ROLL] == pytest.approx(moving.start_speed[ROLL], rel=0.05)
+    assert not replace(moving, speed=None).part(30, 100).start_speed.any()
 
 
 def test_simple_models_begin_in_motion_too(arm, simulate):

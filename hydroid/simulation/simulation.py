@@ -2,11 +2,11 @@
 
 Stage 1 takes the hydraulics for a gain, tau = K u + tau0 on every driven joint (article
 section 3), stage 2 steps the whole chain from command to torque on every active joint
-(`hydroid.simulation.scenario`). Every candidate starts in the log's first pose,
-at rest or in motion, in static balance with gravity: its springs are slack there, and its oil, or in stage 1
-a constant torque tau0 = g(q0), holds it. Each is rolled out by compiled code, as many
-at a time as there are threads; candidates are independent, and no number of threads
-changes a bit.
+(`hydroid.simulation.scenario`). Every candidate starts in the log's first pose, at rest
+or in motion, in static balance with gravity: its springs are slack there, and its oil,
+or in stage 1 a constant torque tau0 = g(q0), holds it. Each is rolled out by compiled
+code, as many at a time as there are threads; candidates are independent, and no number
+of threads changes a bit.
 """
 
 import math

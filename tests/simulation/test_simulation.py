@@ -211,6 +211,8 @@ def test_passive_joints_that_hardly_move_leave_the_shoulder_as_locked_ones(
 
 
 TIME = 0.01 * np.arange(300)
+REST = np.zeros(1)
+"""speed before the start [rad/s]"""
 
 
 def sensors(scale: float, lag: float) -> np.ndarray:
@@ -219,21 +221,28 @@ def sensors(scale: float, lag: float) -> np.ndarray:
 
 def test_a_plain_sensor_reads_the_angle_to_the_bit():
     angle = np.random.default_rng(0).normal(size=(50, 1))
-    assert reading(angle, sensors(1.0, 0.0), 0.01) is angle
+    assert reading(angle, sensors(1.0, 0.0), 0.01, REST) is angle
 
 
 def test_a_lagging_sensor_follows_a_ramp_late():
     angle = 0.3 + 0.2 * TIME[:, None]
-    seen = reading(angle, sensors(1.0, 0.15), 0.01)[:, 0]
+    seen = reading(angle, sensors(1.0, 0.15), 0.01, REST)[:, 0]
     np.testing.assert_allclose(
         seen, 0.3 + 0.2 * (TIME - 0.15 * (1 - np.exp(-TIME / 0.15))), atol=1e-12
     )
 
 
+def test_a_lagging_sensor_of_a_joint_in_motion_reads_on():
+    """It is late by the same angle from the start on."""
+    angle = 0.3 + 0.2 * TIME[:, None]
+    seen = reading(angle, sensors(1.1, 0.15), 0.01, np.array([0.2]))[:, 0]
+    np.testing.assert_allclose(seen, 0.3 + 1.1 * 0.2 * TIME, atol=1e-12)
+
+
 def test_a_scale_acts_on_the_turn_since_the_start():
     angle = 0.3 + 0.2 * np.sin(TIME)[:, None]
     np.testing.assert_allclose(
-        reading(angle, sensors(1.1, 0.0), 0.01), 0.3 + 1.1 * (angle - 0.3)
+        reading(angle, sensors(1.1, 0.0), 0.01, REST), 0.3 + 1.1 * (angle - 0.3)
     )
 
 

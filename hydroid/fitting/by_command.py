@@ -7,13 +7,15 @@ from hydroid.fitting.baselines import fit_baselines
 from hydroid.fitting.left_out import Gain, gain, is_clear, predict_blocks
 from hydroid.fitting.multistart import alone, lone_joints
 from hydroid.fitting.refiner import Place, Refiner
-from hydroid.fitting.starts import LESS, valve_alone
+from hydroid.fitting.starts import LESS, share_pump, valve_alone
 from hydroid.fitting.step import Start
 from hydroid.fitting.tried import Tried
 from hydroid.posterior.error_model import make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.rungs import BY_COMMAND
 
+NO_LOAD = 0.9
+"""compensation from which the logs show no load"""
 FAR_LESS = 1 / 3
 """part of a simple model's error: a joint that errs by less has more to lose than load
 and pump"""
@@ -24,20 +26,27 @@ def with_joints_by_command(refiner: Refiner, kept: Place, tried: Tried) -> Place
     alone, where that foretells parts left out better than load and pump.
 
     Each joint that errs by more than noise, and not by far less than simple models, is
-    tried alone; `tried` takes what that gained.
+    tried alone; `tried` takes what that gained. So is one whose load the logs do not
+    show: it takes the term unless that foretells worse, for what is left of its load
+    would show in other poses.
     """
     if not kept.problem.settings.rung.has(BY_COMMAND):
         return kept
     possible = kept.problem.settings.outputs
     if len(possible) > 1:
         possible = lone_joints(kept.problem)
-    erring = dict[str, int]()
+    simpler = dict[str, int]()
+    unloaded = set[int]()
     for term, joint in refiner.whole.settings.by_command_terms.items():
         tried.alone(None, term)
-        if joint in possible and _may_be_simpler(kept, joint):
-            erring[term] = joint
+        if joint not in possible:
+            continue
+        if _shows_no_load(kept, joint):
+            unloaded.add(joint)
+        if joint in unloaded or _may_be_simpler(kept, joint):
+            simpler[term] = joint
     now = kept
-    for term, joint in erring.items():
+    for term, joint in simpler.items():
         found = _by_command(refiner, now, term, joint)
         if refiner.late:
             return kept
@@ -45,10 +54,28 @@ def with_joints_by_command(refiner: Refiner, kept: Place, tried: Tried) -> Place
             continue
         gained, place = found
         tried.alone(gained, term)
-        if is_clear(*gained, among=len(erring)):
+        rise, error = gained
+        if joint in unloaded:
+            better = not is_clear(-rise, error)
+        else:
+            better = is_clear(rise, error, among=len(simpler))
+        if better:
             step = now.step.changed(terms=place.step.terms)
             now = replace(place, step=step, problem=refiner.problem_of(step))
     return now
+
+
+def _shows_no_load(kept: Place, joint: int) -> bool:
+    """Return whether a fit has found that a joint's valve makes good nearly all of its
+    load, which settings do not expect, and no pump is shared."""
+    problem = kept.problem
+    if share_pump(problem, kept.theta):
+        return False
+    found, begun = (
+        problem.bindings.candidates(theta[None]).joints["compensation"][0, joint - 1]
+        for theta in (kept.theta, problem.parameters.start)
+    )
+    return bool(found > NO_LOAD > begun)
 
 
 def _may_be_simpler(kept: Place, joint: int) -> bool:

@@ -232,7 +232,9 @@ class Ladder:
             return
         found = with_joints_by_command(self._refiner, self._place, self.tried)
         if found.step != self._step:
-            self._rung(found.step, begun=found.theta)
+            # at the noise all joints together tell no more than each alone has
+            at_noise = self.problem.leaves_noise(self.kept.theta)
+            self._rung(found.step, begun=found.theta, if_better=not at_noise)
 
     def _end(self) -> None:
         """Refine the estimate that is kept to the tolerance of the settings."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recovery import bands_in, model_of
-from two_joints import OPENINGS, PARAMETERS, TRUTH, drive, two_joints
+from two_joints import FIT, OPENINGS, PARAMETERS, TRUTH, drive, two_joints
 
 from hydroid.advice.terms import terms
 from hydroid.errors import SettingsError
@@ -167,6 +167,35 @@ def test_no_joint_that_a_load_slows_takes_it(tmp_path):
     for gained in found.tried.values():
         # where it errs much more it is not even refined
         assert gained is None or gained[0] < 0
+
+
+def test_a_joint_whose_load_the_logs_do_not_show_takes_it(tmp_path):
+    """A valve that makes all of its load good does as well there, but leaves a load that
+    is none to other poses. A joint that feels its load keeps it, at the noise, too."""
+    good = {
+        f"K_{joint}": {
+            "quantity": "compensation",
+            "joints": [joint],
+            "bounds": [0, 1],
+            "start": 0.2,
+        }
+        for joint in ("lift", "tilt")
+    }
+    pump = ("flow", "droop")
+    own = {name: entry for name, entry in PARAMETERS.items() if name not in pump}
+    oil = {
+        name: value for name, value in FIT["hydraulics"].items() if "pump" not in name
+    }
+    settings = two_joints(
+        tmp_path, parameters=own | good | CHOICES, hydraulics=oil, search=SEARCH
+    )
+    machine = settings.of_estimate(TILT)
+    truth = {name: value for name, value in TRUTH.items() if name not in pump}
+    truth |= {"K_lift": 0.0}
+    logs = [drive(machine, seed, truth) for seed in (1, 2)]
+    found = fit(Problem(settings, logs))
+    assert np.degrees(found.best.rms) == pytest.approx(0.02, rel=0.1)
+    assert found.final == TILT
 
 
 class Hurried(Silent):

@@ -228,6 +228,8 @@ def _law(settings: FitSettings, motion: _Motion, joint: int) -> Law | None:
     angle = motion.angle[:, joint]
     used = (angle > low + FROM_STOPS) & (angle < high - FROM_STOPS)
     used &= np.abs(commands).max(axis=1) > FROM_ZERO
+    if not used.any():
+        return None
     angle = angle[used]
     speeds = motion.speed[used]
     rows = _by_command(commands[used])

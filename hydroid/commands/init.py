@@ -35,7 +35,8 @@ def init(
 
     If it does not recognise the columns of a log, it lists them in the project's
     fit.yaml, and the exit status is 2. Write there what each column is. Then run init
-    again with --config.
+    again with --config. The status is 2, too, if the first log cannot be used as it is:
+    a line says what to mend.
 
     Example: hydroid init mine --arm robot.urdf --log a.csv
 
@@ -102,7 +103,8 @@ def init(
     for key in ("files", "notes", "columns", "unused", "commands"):
         content[key] = [*getattr(project, key)]
     lines = _lines(project, guessed=kept_config is None)
-    return Result(lines, content, project, exit_status=2 if project.missing else 0)
+    is_ready = not (project.missing or project.unusable)
+    return Result(lines, content, project, exit_status=0 if is_ready else 2)
 
 
 def _refuse_two_arms(robot: Path | None, lengths: str | list[str] | None) -> None:
@@ -145,8 +147,9 @@ def _lines(project: "Project", *, guessed: bool) -> list[str]:
                 "The log's columns, guessed. Check them, and correct them in fit.yaml:"
             )
         picture = project.folder / "arm.png"
+        mend = "mend the log, as it says above, and " if project.unusable else ""
         look = (
-            f"Next: look at {picture}, then (--budget 5min stops a fit at its best model "
+            f"Next: {mend}look at {picture}, then (--budget 5min stops a fit at its best model "
             "after 5 min on the clock; --resume gives it 5 more):"
         )
     lines = [f"{project.folder}: {', '.join(project.files)}"]

@@ -23,7 +23,7 @@ from hydroid.log.table import Signal, Table
 
 SMALL_COMMAND = 5.0
 """of a log's commands, the smallest is below this [%], if one of 0 is none"""
-NOISE = 0.005
+NOISE = 0.02
 """part of the range of a command that a lever at rest may show"""
 NEVER_AT_REST = (
     "it is never 0, so where it rests is not known: correct scale and offset"

@@ -25,7 +25,7 @@ BEGINNING = 0.2
 at least"""
 SURELY = 5.0
 """standard deviations of a speed from which a joint moves"""
-LATE = 0.01
+LATE = 0.03
 """by which a joint may seem to begin to move after the first sample, though it has
 moved before [s]"""
 MOVES = 0.2

@@ -39,7 +39,7 @@ from hydroid.words import listed
 
 GUESSED = "GUESSED from the log: check every line."
 GIVEN = "As you gave them, compared with the log."
-UNDRIVEN = "no command in the logs, so not compared"
+UNDRIVEN = "no command in the logs that are fitted, so not compared"
 STANDING = (
     "driven, but the angle never changes, so not compared; check the sensor, or its "
     "column in fit.yaml"
@@ -49,7 +49,7 @@ REVERSED = (
     "way instead (compare arm.png), set scale: -1 at its angle and not at its command: gravity "
     "follows the angle"
 )
-QUICKEST = 0.03
+QUICKEST = 0.06
 """delay and lag of a joint of which the first samples tell whether it begins at rest
 [s]"""
 LACKING = {

@@ -15,6 +15,7 @@ from hydroid.progress import Progress
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import LogSettings
 
+UNUSABLE = "the log cannot be used as it is"
 SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
 """kinds of findings that say which part of a log is not read, or not told by it"""
 
@@ -62,7 +63,7 @@ def read_first(
     if not parts:
         if strict:
             raise findings[0].error()
-        reasons.append(f"the log cannot be used as it is: {findings[0]}")
+        reasons.append(f"{UNUSABLE}: {findings[0]}")
         repaired = Reading(arm=arm, repair=True)
         parts, _ = check_parts(path, settings, limits, repaired, progress)
     reasons += _said(findings)

@@ -19,7 +19,7 @@ from hydroid.log.mapping import angle_margin
 from hydroid.progress import Progress, no_progress
 from hydroid.project.boxes import boxes_urdf, moves_as
 from hydroid.project.layout import Layout, find_layout
-from hydroid.project.logs import Others
+from hydroid.project.logs import UNUSABLE, Others
 from hydroid.project.texts import JointSize, arm_text, fit_text, joint_sizes
 from hydroid.reporting.figure import arm_picture
 from hydroid.settings.arm import Arm, load_arm
@@ -57,6 +57,12 @@ class Project:
     unused: tuple[str, ...]
     commands: tuple[str, ...]
     missing: str = ""
+
+    @property
+    def unusable(self) -> bool:
+        """Whether the first log must be mended before it can be fitted; one of
+        `columns` says why."""
+        return any(reason.startswith(UNUSABLE) for reason in self.columns)
 
 
 def write_project(

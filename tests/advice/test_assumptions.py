@@ -39,6 +39,9 @@ def test_logs_that_cannot_tell_name_nothing(tmp_path):
     log = drive(settings)
     unmeasured = log.angle * np.where([True, False], 1.0, np.nan)
     still = replace(log, angle=np.tile(log.angle[:1], (len(log.angle), 1)))
+    noise = replace(log, command=log.command * [1.0, 0.02])
     for one in (log.first(1.0), still, replace(log, angle=unmeasured)):
         assert doubts(settings, [one]) == {}
         assert exchanged(settings, [one]) == ()
+    # of a joint whose lever shows noise alone
+    assert 2 not in doubts(settings, [noise])

@@ -41,6 +41,8 @@ UNITS = {
     "pulses of 1 to 2 ms": "ms",
     "1000 to 2000 µs": "us",
     "6 to 18 V": "V",
+    "±24 V": "V",
+    "±10000 mV": "mV",
     "4 to 20 mA": "mA",
 }
 

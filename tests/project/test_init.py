@@ -109,9 +109,9 @@ def test_a_joint_that_seldom_moves_is_sized_by_how_fast_it_moves(
         assert next(dampings) == pytest.approx(next(dampings), rel=0.3)
 
 
-@pytest.mark.parametrize("lever", ["0", "0.02"])
+@pytest.mark.parametrize("lever", [0.0, 0.03])
 def test_a_joint_that_stands_in_the_first_log_is_read_by_the_others(
-    lever: str, place: Path, tmp_path: Path
+    lever: float, place: Path, tmp_path: Path
 ):
     """What its command is in, and which way it turns, only another log tells; its lever
     may be noisy at rest [V]."""
@@ -120,8 +120,9 @@ def test_a_joint_that_stands_in_the_first_log_is_read_by_the_others(
         command, angle = (
             rows[0].index(f"boom {what}") for what in ("valve [V]", "angle [rad]")
         )
-        for k, row in enumerate(rows[1:]):
-            row[command], row[angle] = (lever if k % 7 == 0 else "0"), rows[1][angle]
+        noise = lever * np.random.default_rng(0).normal(size=len(rows))
+        for row, volts in zip(rows[1:], noise, strict=False):
+            row[command], row[angle] = f"{volts:.4f}", rows[1][angle]
 
     first = renamed(place, tmp_path / "log.csv", boom_stands)
     made = init(
@@ -446,7 +447,7 @@ def test_a_joint_that_no_fitted_log_drives_is_not_compared(place: Path, tmp_path
     made = init(tmp_path / "one", arm, [boom])
     assert hydroid.load_settings(tmp_path / "one/fit.yaml").outputs == (2,)
     assert (
-        "swing_joint and stick_joint: no command in the logs, so not compared"
+        "swing_joint and stick_joint: no command in the logs that are fitted, so not compared"
         in made.columns
     )
     init(tmp_path / "two", arm, [boom, both, place / "move_1.csv"])
@@ -471,6 +472,24 @@ def test_a_joint_without_an_angle_is_named_with_what_becomes_of_it(
     )
     (said,) = [line for line in made.columns if "no angle found" in line]
     assert "stick_joint: simulated by the command, and compared with nothing" in said
+
+
+def test_a_log_that_must_be_mended_first_is_no_success(place: Path, tmp_path: Path):
+    def backwards(rows: list[list[str]]) -> None:
+        rows[1:] = rows[:0:-1]
+
+    log = renamed(place, tmp_path / "log.csv", backwards)
+    arguments = [
+        "init",
+        f"{tmp_path / 'mine'}",
+        "--arm",
+        f"{place / 'mine' / 'arm.yaml'}",
+    ]
+    done = CliRunner().invoke(app, [*arguments, "--log", f"{log}"])
+    assert done.exit_code == 2
+    assert "the log cannot be used as it is" in done.output
+    assert "time does not increase" in done.output
+    assert "Next: mend the log" in done.output
 
 
 def test_an_error_names_no_file_that_is_gone(tmp_path: Path):

@@ -1,5 +1,6 @@
 """Joints whose speed follows their commands alone: which of them a fit lets do so."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from hydroid.arrays import rms
@@ -32,50 +33,56 @@ def with_joints_by_command(refiner: Refiner, kept: Place, tried: Tried) -> Place
     """
     if not kept.problem.settings.rung.has(BY_COMMAND):
         return kept
-    possible = kept.problem.settings.outputs
-    if len(possible) > 1:
-        possible = lone_joints(kept.problem)
-    simpler = dict[str, int]()
-    unloaded = set[int]()
-    for term, joint in refiner.whole.settings.by_command_terms.items():
-        tried.alone(None, term)
-        if joint not in possible:
-            continue
-        if _shows_no_load(kept, joint):
-            unloaded.add(joint)
-        if joint in unloaded or _may_be_simpler(kept, joint):
-            simpler[term] = joint
+    asked = _asked(refiner, kept, tried)
     now = kept
-    for term, joint in simpler.items():
+    for term, (joint, shows_load) in asked.items():
         found = _by_command(refiner, now, term, joint)
         if refiner.late:
             return kept
         if found is None:
             continue
-        gained, place = found
-        tried.alone(gained, term)
-        rise, error = gained
-        if joint in unloaded:
-            better = not is_clear(-rise, error)
-        else:
-            better = is_clear(rise, error, among=len(simpler))
-        if better:
+        (rise, error), place = found
+        tried.alone((rise, error), term)
+        takes_it = not is_clear(-rise, error)
+        if shows_load:
+            takes_it = is_clear(rise, error, among=len(asked))
+        if takes_it:
             step = now.step.changed(terms=place.step.terms)
             now = replace(place, step=step, problem=refiner.problem_of(step))
     return now
 
 
-def _shows_no_load(kept: Place, joint: int) -> bool:
-    """Return whether a fit has found that a joint's valve makes good nearly all of its
-    load, which settings do not expect, and no pump is shared."""
+def _asked(
+    refiner: Refiner, kept: Place, tried: Tried
+) -> Mapping[str, tuple[int, bool]]:
+    """Return the terms that are tried, each with its joint, and whether the logs show
+    the load of that."""
+    possible = kept.problem.settings.outputs
+    if len(possible) > 1:
+        possible = lone_joints(kept.problem)
+    asked = dict[str, tuple[int, bool]]()
+    for term, joint in refiner.whole.settings.by_command_terms.items():
+        tried.alone(None, term)
+        if joint not in possible:
+            continue
+        shows_load = _shows_load(kept, joint)
+        if not shows_load or _may_be_simpler(kept, joint):
+            asked[term] = joint, shows_load
+    return asked
+
+
+def _shows_load(kept: Place, joint: int) -> bool:
+    """Return whether the logs show the load of a joint, or that of a shared pump.
+
+    They do not where a fit has found that its valve makes good nearly all of the load,
+    which the settings do not expect.
+    """
     problem = kept.problem
-    if share_pump(problem, kept.theta):
-        return False
     found, begun = (
         problem.bindings.candidates(theta[None]).joints["compensation"][0, joint - 1]
         for theta in (kept.theta, problem.parameters.start)
     )
-    return bool(found > NO_LOAD > begun)
+    return share_pump(problem, kept.theta) or not found > NO_LOAD > begun
 
 
 def _may_be_simpler(kept: Place, joint: int) -> bool:

@@ -34,7 +34,7 @@ from hydroid.project.section import (
 )
 from hydroid.settings.arm import Arm, Joint
 from hydroid.settings.load import validate
-from hydroid.settings.log import EFFECTS, Input, LogSettings
+from hydroid.settings.log import EFFECTS, Input, LogSettings, log_file
 from hydroid.words import listed
 
 GUESSED = "GUESSED from the log: check every line."
@@ -181,6 +181,7 @@ def _seen(
         varied = tuple(name for name in EFFECTS if varies(logs, name))
         reach = reach_of([*logs, *unseen], measured)
         motions = {joint: _telling(logs, joint) for joint in measured}
+        reasons += _disagreeing(logs, motions, arm)
         _refuse_rest(table, driven, logs, arm.joint_names)
         driven = _driven(driven, logs, arm.joint_names, reasons)
     wrong = _turn_commands(entries, motions, reach, arm, reasons)
@@ -234,6 +235,29 @@ def _telling(logs: Sequence[Log], joint: int) -> JointMotion:
     if most.push > 0.0:
         return most
     return max(motions, key=lambda motion: motion.travel)
+
+
+def _disagreeing(
+    logs: Sequence[Log], motions: Mapping[int, JointMotion], arm: Arm
+) -> Iterator[str]:
+    """Yield which logs turn a joint clearly the other way by its command than the log
+    that drives it most."""
+    for joint, motion in motions.items():
+        one_way = motion.contradicts(backward=False)
+        other_way = motion.contradicts(backward=True)
+        others = list[str]()
+        for log in logs:
+            own = motion_of(log, joint)
+            turns = own.contradicts(backward=one_way)
+            if turns and one_way != other_way:
+                others.append(log_file(log.source).name)
+        if others:
+            name = arm.joint_names[joint - 1]
+            most = log_file(motion.log.source).name
+            yield (
+                f"{name} turns by its command the other way in {listed(sorted({*others}))} than in "
+                f"{most}: record these logs alike"
+            )
 
 
 def _with_command(entries: Mapping[int, Plain], joints: Sequence[int]) -> list[int]:

@@ -109,6 +109,24 @@ def test_a_joint_that_seldom_moves_is_sized_by_how_fast_it_moves(
         assert next(dampings) == pytest.approx(next(dampings), rel=0.3)
 
 
+def test_a_log_whose_commands_count_the_other_way_is_named(place: Path, tmp_path: Path):
+    def turned(rows: list[list[str]]) -> None:
+        column = rows[0].index("stick valve [V]")
+        for row in rows[1:]:
+            row[column] = f"{-float(row[column]):g}"
+
+    other = renamed(place, tmp_path / "turned.csv", turned)
+    arm = place / "mine" / "arm.yaml"
+    logs = [place / "move_1.csv", other, place / "move_2.csv"]
+    made = init(tmp_path / "mine", arm, logs)
+    (said,) = [line for line in made.columns if "turns by its command" in line]
+    assert said.startswith("stick_joint turns by its command the other way in ")
+    assert "turned.csv" in said
+    assert "move_1.csv" in said
+    alike = init(tmp_path / "alike", arm, [place / "move_0.csv", place / "move_1.csv"])
+    assert not any("turns by its command" in line for line in alike.columns)
+
+
 @pytest.mark.parametrize("lever", [0.0, 0.03])
 def test_a_joint_that_stands_in_the_first_log_is_read_by_the_others(
     lever: float, place: Path, tmp_path: Path

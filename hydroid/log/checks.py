@@ -27,6 +27,9 @@ but have a common reason"""
 UNEVEN = 0.25
 """part of the period by which steps may differ from it, above which they are uneven"""
 
+MISPLACED = 1.0
+"""how far the time may fall back at a line that only stands in the wrong place [s]"""
+
 
 def check_recording(
     recording: Recording, settings: LogSettings
@@ -73,9 +76,10 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
     falls = 1 + np.flatnonzero(steps <= 0)
     if len(falls):
         before, after = time[falls[0] - 1 : falls[0] + 1]
-        yield recording.finding(
-            "error", "time order", falls, signal, time=after, before=before
-        )
+        # a line out of order falls by a few periods
+        is_new_clock = len(falls) == 1 and before - after > MISPLACED
+        kind = "time begins again" if is_new_clock else "time order"
+        yield recording.finding("error", kind, falls, signal, time=after, before=before)
         return
     duration = 0.0
     if len(times):

@@ -207,6 +207,8 @@ def _time_column(table: Table, columns: Sequence[Column]) -> Column:
     times = [column for column in columns if column.kind == "time"]
     if not times:
         hint = f"it has {listed([*filter(None, table.names)], 6)}"
+        if not any(map(len, table.columns.values())):
+            hint = "no rows of numbers follow the names of its columns"
         raise LogError("has no column that looks like a time", table.source, hint)
     return max(times, key=lambda column: rises(column.values))
 

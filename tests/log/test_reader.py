@@ -71,6 +71,11 @@ FAULTS = {
     "one column": (lambda rows: [r.__setitem__(slice(None), [":".join(r)]) for r in rows], "", "one column"),
     "no times": (lambda rows: [r.__setitem__(0, "x") for r in rows[1:]], "line 2, column time_s", "'x'"),
     "backwards": (values(lambda t: t[::-1]), "line 3, column time_s", "does not increase"),
+    "a clock that begins again": (
+        values(lambda t: (t - (np.arange(len(t)) >= 50)[:, None] * [0.4, 0, 0, 0, 0]) * [4, 1, 1, 1, 1]),
+        "line 52, column time_s",
+        "hand in what was recorded before and after as two logs",
+    ),
     "short": (values(lambda t: t[:20]), "column time_s", "at least 0.5 s is needed"),
     "empty": (values(lambda t: t[:0]), "column time_s", "samples: 0"),
     "every 6 s": (

@@ -492,6 +492,16 @@ def test_a_joint_without_an_angle_is_named_with_what_becomes_of_it(
     assert "stick_joint: simulated by the command, and compared with nothing" in said
 
 
+def test_a_log_without_rows_is_told_that_it_has_none(place: Path, tmp_path: Path):
+    def without_rows(rows: list[list[str]]) -> None:
+        del rows[1:]
+
+    log = renamed(place, tmp_path / "log.csv", without_rows)
+    with pytest.raises(LogError, match="no rows of numbers follow"):
+        hydroid.init(tmp_path / "mine", arm=place / "mine" / "arm.yaml", log=log)
+    assert not (tmp_path / "mine").exists()
+
+
 def test_a_log_that_must_be_mended_first_is_no_success(place: Path, tmp_path: Path):
     def backwards(rows: list[list[str]]) -> None:
         rows[1:] = rows[:0:-1]

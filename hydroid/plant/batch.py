@@ -61,6 +61,7 @@ class PlantRows(NamedTuple):
     state: Any  # (n, J), of JOINT_STATE
     commands: Array  # (n, past + steps, J)
     torque: Array  # (n, steps, P)
+    links: Structs  # (n, V + 1) of LINK, or (n, 0), as of `Handles`
     angle: Array  # (n, 1, V)
     failed: Mask  # (n,)
 
@@ -92,7 +93,7 @@ def _roll_some(rows, shared, plugin, plants, roll) -> None:
     """
     joints = shared.angle.size
     entries = shared.mass.size
-    bodies = shared.links.size
+    bodies = plants.links.shape[1]
     # a warning of MuJoCo's has two numbers: every other one is its count
     numbers = 2 * shared.warnings.size - 1
     nothing = np.empty((0, 0))
@@ -115,7 +116,7 @@ def _roll_some(rows, shared, plugin, plants, roll) -> None:
             bare_armature=shared.bare_armature,
             pushed=shared.pushed,
             steps=shared.steps,
-            links=shared.links,
+            links=plants.links[i],
             body_mass=_floats(at[7], bodies),
             body_centre=_floats(at[8], 3 * bodies).reshape((bodies, 3)),
             slack=_floats(at[9], joints),
@@ -364,6 +365,7 @@ class PlantBatch:
         self._pushed = parts.chain.pushed
         steps = parts.course.torque.shape[0]
         joints = len(self._coupled)
+        links = parts.arm.handles.links
         self._angle = np.empty((n, 1, len(self._columns)))
         self._pose = np.empty((n, len(first.names)))
         self._gain = np.empty((n, len(self._columns)))
@@ -374,6 +376,7 @@ class PlantBatch:
             state=np.zeros((n, joints), parts.state.dtype),
             commands=np.zeros((n, self._past + steps, joints)),
             torque=np.zeros((n, steps, len(self._pushed))),
+            links=np.zeros((n, len(links)), links.dtype),
             angle=self._angle,
             failed=np.zeros(n, np.bool_),
         )
@@ -399,6 +402,8 @@ class PlantBatch:
         stacked.addresses[row] = _addresses(plant)
         stacked.coefficients[row] = parts.plugin.coefficients
         stacked.state[row] = parts.state
+        # where its locked joints stand now
+        stacked.links[row] = parts.arm.handles.links
         stacked.commands[row] = 0.0
         stacked.failed[row] = False
         self._gain[row] = parts.gain

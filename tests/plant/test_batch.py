@@ -67,6 +67,21 @@ def test_a_batch_steps_to_the_bits_of_its_plants(kind, threads):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_locked_joints_may_stand_elsewhere_at_each_reset(kind):
+    alone = plant(kind)
+    batch = PlantBatch([plant(kind), plant(kind)], threads=1)
+    home = alone.angle
+    # joints 3 and 4, locked between the driven ones
+    bent = home + [0.0, 0.0, 1.2, 1.0, 0.0, 0.0, 0.0]
+    given = np.array([0.0, 60.0, 0.0, 0.0, 40.0, 0.0, 0.0])
+    for poses in ([bent, bent], [home, bent]):
+        batch.reset(np.array(poses))
+        alone.reset(bent)
+        for _ in range(20):
+            np.testing.assert_array_equal(batch.step(given)[1], alone.step(given))
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_without_shapes_a_plant_steps_to_the_same_bits(kind):
     shaped = plant(kind)
     bare = Plant(shaped.identified, joints=JOINTS, shapes=False)

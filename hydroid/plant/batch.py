@@ -291,10 +291,14 @@ class PlantBatch:
     def restore(self, row: int, state: "RowState") -> None:
         """Put the plant of a row where it stood; it then steps to the same bits.
 
-        Its locked joints must stand where they stood then.
+        It takes as long as a reset where its locked joints stand elsewhere by now.
         """
         plant = self.plants[row]
         stacked = self._plant_rows
+        # locked joints are fused into the model
+        if not np.array_equal(self._pose[row, self._locked], state.pose[self._locked]):
+            plant.reset(state.pose)
+            self._take(row)
         mujoco.mj_setState(plant.model, plant.data, state.physics, PHYSICS)
         plant.data.M[:] = state.mass
         plant.data.warning.number[:] = 0
@@ -359,6 +363,7 @@ class PlantBatch:
         n = len(self)
         parts = first.parts
         self._columns = parts.columns
+        self._locked = np.setdiff1d(np.arange(len(first.names)), self._columns)
         # the joints that take commands, among those that move
         self._driven = np.flatnonzero(self._active[self._columns])
         self._coupled = parts.chain.columns

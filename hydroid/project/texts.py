@@ -91,8 +91,7 @@ def _torques(arm: Arm) -> Array:
     (J,)."""
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
-    low = np.maximum(arm.lower, -np.pi)
-    high = np.minimum(arm.upper, np.pi)
+    low, high = arm.limits.T
     torque = np.zeros(len(arm.joints))
     # the same poses every time: a project is written twice with the same bytes
     for pose in np.random.default_rng(0).uniform(low, high, (300, len(low))):

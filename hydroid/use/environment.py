@@ -44,8 +44,6 @@ POSES = 256
 that is ready takes a hundredth of a reset"""
 LEAST_POSES = 4
 """of these, each machine has as many at least"""
-ENDLESS = np.pi
-"""end of the range of a joint that turns without end [rad]"""
 LARGEST = 10.0
 """of an observation, whose machine may diverge"""
 MARGIN = 0.1
@@ -88,8 +86,7 @@ class _Machines:
             plants.append(plant)
         self.batch = PlantBatch(plants, threads=threads)
         self._columns = np.array(self.joints) - 1
-        ranges = np.clip([arm.lower, arm.upper], -ENDLESS, ENDLESS)
-        low, high = ranges[:, self._columns]
+        low, high = arm.limits[self._columns].T
         self._middle = 0.5 * (low + high)
         self._half = 0.5 * (high - low)
         self._pose = arm.pose(settings.start_pose)

@@ -19,6 +19,7 @@ from hydroid.errors import HydroidError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import write_log
 from hydroid.plant import Plant, load_plant
+from hydroid.use.tables import speed_tables
 
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
 
@@ -52,6 +53,17 @@ def test_a_table_holds_the_settled_speeds(model, tmp_path):
                     plant.speeds({"shoulder": float(row["command_pct"])}, at=pose)[1]
                 )
                 assert float(cell) == pytest.approx(speed, rel=2e-3)
+
+
+def test_a_table_covers_the_whole_range_of_a_telescope(tmp_path):
+    crane = tmp_path / "crane"
+    hydroid.init(crane, joints=["swing", "boom", "telescope"], lengths=[0, 6, 6])
+    plant = load_plant(str(crane / "fit.yaml"))
+    low, high = plant.identified.settings.arm.ranges["telescope"]
+    assert high - low > np.pi  # metres
+    table = speed_tables(plant)["speeds_telescope.csv"]
+    last = table.splitlines()[0].rsplit(",", 1)[-1]
+    assert last == f"mm_per_s_at_{1e3 * (low + 0.9 * (high - low)):.4g}_mm"
 
 
 def test_draws_of_a_fit_are_written_with_ranges_and_errors(tmp_path):

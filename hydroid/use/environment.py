@@ -337,7 +337,8 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
         every = np.ones(self.num_envs, dtype=bool)
         rows = np.flatnonzero(options.get("reset_mask", every)).tolist()
         self._machines.begin(rows, self.np_random, options)
-        self._over[:] = False
+        # the others are over still, and begin anew with the next step
+        self._over[rows] = False
         return self._machines.observe(self.np_random), {}
 
     def step(self, actions: Floats) -> tuple[Floats, Array, Any, Any, dict[str, Any]]:

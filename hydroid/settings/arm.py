@@ -246,6 +246,10 @@ class Arm(Settings):
             for joint in self.joints
         }
 
+    def stops(self, joint: int) -> Limits:
+        """Return the `ranges` of a joint by its number, from 1."""
+        return self.ranges[self.name_of(joint)]
+
     @property
     def slides(self) -> tuple[int, ...]:
         """Joints, from 1, that slide."""

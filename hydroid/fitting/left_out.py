@@ -124,8 +124,8 @@ def predict_blocks(problem: Problem, end: Refinement) -> LeftOut:
     may be very large. That is no fault of the model: the prediction is as uncertain.
     With J the block's slopes, C the covariance of the parameters without it and r its
     residual in the fit to all, the residual left out is S r with S = 1 + J C Jᵀ, and S
-    is also its covariance. So its density has rᵀ S r and log |S| (G. A. F. Seber and A. J. Lee, *Linear Regression
-    Analysis*, 2003, chapter 10), and neither needs a matrix of the block's size.
+    is also its covariance. So its density has rᵀ S r and log |S| (G. A. F. Seber and A. J.
+    Lee, *Linear Regression Analysis*, 2003, chapter 10), and neither needs a matrix of the block's size.
     """
     theta = problem.parameters.from_unit(end.point)
     weighing = likelihood_at(problem, theta, end.numbers)

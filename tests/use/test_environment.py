@@ -87,6 +87,7 @@ def test_a_reset_of_some_machines_leaves_the_others_over(model):
     several = VectorEnv(model, 3, seed=None, seconds=0.5, errors=False)
     several.reset(seed=3)
     action = np.tile(np.array([0.4, -0.4], np.float32), (3, 1))
+    truncated = np.zeros(3, dtype=bool)
     for _ in range(10):
         _, _, _, truncated, _ = several.step(action)
     assert truncated.all()

@@ -105,7 +105,7 @@ def compare(
     settings: FitSettings, fitted: Sequence[Log], unseen: Sequence[Log]
 ) -> None:
     for joint in settings.outputs:
-        limits = [*settings.arm.ranges.values()][joint - 1]
+        limits = settings.arm.stops(joint)
         name = settings.arm.joint_names[joint - 1]
         tests = [log for log in unseen if log.driven[joint - 1]]
         clock = Clock()

@@ -23,7 +23,7 @@ def record(kind: type[T]) -> type[T]:
     """Make a frozen dataclass that equals itself alone: whether arrays are equal has no
     one answer.
 
-    One that prints itself in its own way keeps it.
+    A class with its own `__repr__` keeps that.
     """
     return dataclass(frozen=True, eq=False, repr=kind.__repr__ is object.__repr__)(kind)
 

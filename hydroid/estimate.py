@@ -72,7 +72,7 @@ class NamedEstimate(Settings):
 
 class Covariance(Settings):
     """What is known of the free parameters together:
-    C^-1 = G' G per relative change (`Uncertainty.root`)."""
+    C^-1 = G' G per relative change (`Posterior.root`)."""
 
     parameters: tuple[str, ...]
     """the p free ones"""

@@ -6,6 +6,7 @@ a positive command causes, and `delay_b` towards B; the name without an ending s
 both.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Literal, NamedTuple
@@ -71,6 +72,13 @@ class Quantity(NamedTuple):
         if self.limits:
             return self.limits[0]
         return 0.0
+
+    @property
+    def highest(self) -> float:
+        """The largest value that a fit may try; inf where there is no limit."""
+        if self.limits:
+            return self.limits[1]
+        return math.inf
 
     @property
     def of_the_pump(self) -> bool:

@@ -32,6 +32,11 @@ _PLACES = (
 )
 GEOMETRY = {*_PLACES, "radius", "length", "size", "scale", "ref"}
 """attributes that say where things are and how large"""
+INERTIAL = {
+    "mass": ("value",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+}
+"""attributes of a URDF's elements that say what a link weighs"""
 OWN_NAMES = ("link", "joint", "body")  # elements whose name may stand once only
 NO_NAMES = ("null", "true", "false")  # in YAML
 COPIES = 2000  # that an MJCF may ask for
@@ -41,8 +46,8 @@ def read_robot(path: Path) -> ElementTree.Element:
     """Read a URDF, or an MJCF with the files that it includes in their places.
 
     Raises ModelError: a file cannot be read, is too large or too deep, is included
-    twice, or holds the same name twice, or a length, place, angle or limit that is no
-    finite number.
+    twice, or holds the same name twice, or a length, place, angle, limit, mass or
+    inertia that is no finite number.
     """
     root = _parsed(path)
     _include(root, path, path.resolve().parent, {path.resolve()})
@@ -100,6 +105,8 @@ def _include(
     what includes itself has no end."""
     for owner, element in _owned(root):
         _check_numbers(owner, element, path)
+        if root.tag == "robot":
+            _check_inertial(owner, element, path)
         _check_limits(owner, element, path)
     for parent in [*root.iter()]:
         for at, part in reversed([*enumerate(parent)]):
@@ -208,6 +215,18 @@ def _check_numbers(owner: str, element: ElementTree.Element, path: Path) -> None
             shown = f'{name}="{text[:60]}"'
             raise ModelError(
                 f"{_place(owner, element)}: {shown} must be finite numbers", path
+            )
+
+
+def _check_inertial(owner: str, element: ElementTree.Element, path: Path) -> None:
+    """Refuse a mass or an inertia that is no finite number."""
+    for name in INERTIAL.get(element.tag, ()):
+        text = element.get(name, "0")
+        number = _number(text)
+        if number is None or not math.isfinite(number):
+            shown = f'{name}="{text[:60]}"'
+            raise ModelError(
+                f"{_place(owner, element)}: {shown} must be a finite number", path
             )
 
 

@@ -29,9 +29,10 @@ from hydroid.estimate import finite
 from hydroid.files import Plain, write_atomic
 from hydroid.fitting.fit import fit
 from hydroid.log import Log
+from hydroid.parallel.workers import VERSIONS
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER, NOTE, Progress
-from hydroid.run.folder import VERSIONS, deciding, digest, log_hash, model_hash
+from hydroid.run.folder import deciding, digest, log_hash, model_hash
 from hydroid.search.pareto import segment_best
 from hydroid.settings.fit import FitSettings, StudySettings, cell_settings
 from hydroid.settings.load import load

@@ -224,7 +224,8 @@ Law = Callable[[Array], Array]
 def _law(settings: FitSettings, motion: _Motion, joint: int) -> Law | None:
     """Fit a joint's law of speed; None where it moves too little."""
     commands = _late_commands(motion, joint)
-    low, high = settings.arm.joints[joint].limits
+    # infinite where a joint turns on: its angles count on, too
+    low, high = settings.arm.stops(joint + 1)
     angle = motion.angle[:, joint]
     used = (angle > low + FROM_STOPS) & (angle < high - FROM_STOPS)
     used &= np.abs(commands).max(axis=1) > FROM_ZERO

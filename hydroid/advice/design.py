@@ -370,7 +370,7 @@ def _logs_posterior(
 
 def _random_effort(effort: int) -> int:
     """Return how many experiments are drawn at random, of all that are tried: one in
-    six."""
+    six, but 8 at least where there are as many."""
     return max(min(8, effort), effort // 6)
 
 

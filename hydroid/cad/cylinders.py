@@ -195,7 +195,10 @@ def _take_bars(
         return
     settings = _four_bar(data.joint(joint.name), (rocker, pin, child, foot, pin))
     if settings is None:
-        notes.add("its four-bar linkage does not close: left out", joint.name)
+        notes.add(
+            "its four-bar linkage does not close, or two of its pins coincide: left out",
+            joint.name,
+        )
         return
     cylinders[joint.name] = settings
     notes.add("sites of the file give these joints' pivots", joint.name)
@@ -316,7 +319,7 @@ def _joint(pins: Sequence[Pin], first: str, second: str) -> Any:
 
 def _four_bar(joint: Any, pins: Sequence[Pin]) -> Plain | None:
     """Return the settings of a cylinder that turns a joint by a rocker and a coupler,
-    as the file stands.
+    as the file stands; None: its bars do not close, or two of their pins coincide.
 
     The pins are those of rocker and link, rocker and coupler, coupler and child, of the
     tube, of the rod.
@@ -334,6 +337,10 @@ def _four_bar(joint: Any, pins: Sequence[Pin]) -> Plain | None:
     ground, pin, child, foot, eye = (
         complex(offset @ x, offset @ y) for offset in offsets
     )
+    # pins that coincide are no bars; the rod's may be the coupler's
+    lengths = ground, pin - ground, child - pin, child, foot - ground, eye - ground
+    if min(map(abs, lengths)) < SAME:
+        return None
     # the rocker's pivot lies at (ground, 0)
     turn = abs(ground) / ground
     is_left = ((pin - ground) * np.conj(child - ground)).imag > 0

@@ -14,10 +14,12 @@ from hydroid.cad.cylinders import take_cylinders, take_sites
 from hydroid.cad.meshes import convert_meshes
 from hydroid.cad.repair import repair_inertias, weigh
 from hydroid.cad.source import Notes, read_source, sort_shapes, word
+from hydroid.errors import SettingsError
 from hydroid.files import Plain, fill_template
 from hydroid.mjcf import mjcf_text, mujoco_errors
 from hydroid.settings.cylinder import make_cylinder
 from hydroid.settings.linkage import Cylinder
+from hydroid.settings.load import validate
 from hydroid.words import distinct
 
 ENDLESS = 2000.0  # range of a joint that has none [rad, m]
@@ -238,7 +240,10 @@ def _try_cylinder(settings: Plain, joint: Any, data: mujoco.MjData) -> None:
     if not joint.limited[0]:
         raise ValueError("the joint has no limits")
     complete = settings | {"area_a": 1.0, "area_b": 1.0, "max_opening": 1.0}
-    cylinder = Cylinder.model_validate(complete)
+    try:
+        cylinder = validate(complete, Cylinder, "")
+    except SettingsError as error:
+        raise ValueError(error.what) from None
     slides = bool(joint.type[0] == mujoco.mjtJoint.mjJNT_SLIDE)
     low, high = joint.range.tolist()
     make_cylinder(cylinder, (low, high), data, joint.name, slides=slides)

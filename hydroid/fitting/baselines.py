@@ -30,10 +30,10 @@ CLEARLY = 0.9
 """part of another model's error on the fitted logs that a better one stays below"""
 BINS = 24
 """of commands from -100 to 100 %, in a table of speeds"""
-LONGEST_DELAY = 1.0
+LONGEST_FITTED_DELAY = 1.0
 """between a command and its motion [s]"""
 LOWER = (0.0, 0.0, 0.3, 0.3, -np.inf, -np.inf, 0.0, 0.0, 0.0)
-UPPER = (90.0, 90.0, 5.0, 5.0, np.inf, np.inf, 1.5, 1.5, LONGEST_DELAY)
+UPPER = (90.0, 90.0, 5.0, 5.0, np.inf, np.inf, 1.5, 1.5, LONGEST_FITTED_DELAY)
 SCALE = (10.0, 10.0, 0.5, 0.5, 0.2, 0.2, 0.1, 0.1, 0.1)
 """bounds and scales of nine numbers: those of `Baseline.numbers`, row by row, and the
 delay"""
@@ -147,7 +147,7 @@ def fit_baselines(
         return {NAMES[0]: still}
     # the table has no delay of its own to be fitted: the best of all that are tried is
     # taken
-    delays = np.arange(0, LONGEST_DELAY, max(0.02, measured[0].period))
+    delays = np.arange(0, LONGEST_FITTED_DELAY, max(0.02, measured[0].period))
     tables = (_mean_speeds(measured, still, delay) for delay in delays)
     table = min(tables, key=lambda model: np.mean(model.errors(measured) ** 2))
     numbers = _fit_numbers(measured, table)

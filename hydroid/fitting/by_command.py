@@ -92,7 +92,7 @@ def _may_be_simpler(kept: Place, joint: int) -> bool:
     if own.leaves_noise(kept.theta):
         return False
     (error,) = own.rms(own.output_errors(kept.theta[None]))
-    ends = [*own.settings.arm.ranges.values()][joint - 1]
+    ends = own.settings.arm.stops(joint)
     simple = fit_baselines(own.logs, joint, ends).values()
     return error > FAR_LESS * min(rms(model.errors(own.logs)) for model in simple)
 

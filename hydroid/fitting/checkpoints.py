@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hydroid.arrays import Array
 from hydroid.errors import RunError
-from hydroid.parameters import Array
 from hydroid.problem.problem import Problem
 
 SAVE_EVERY = 5.0

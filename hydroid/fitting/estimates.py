@@ -35,8 +35,11 @@ class Estimate:
 
     @property
     def usable(self) -> bool:
-        """Whether it could be simulated: the mean of several candidates that could need
-        not."""
+        """Whether it could be simulated.
+
+        False where it diverged; a mean of candidates may diverge though none of them
+        does.
+        """
         return bool(np.isfinite(self.rms))
 
 

@@ -120,12 +120,12 @@ def predict_blocks(problem: Problem, end: Refinement) -> LeftOut:
     Cook, 1977), within the bounds. All logs keep a share in each fit: one of two logs
     alone may leave a parameter open, and then tells nothing of a model.
 
-    What only this block tells of may then be anywhere, and its errors very large. That
-    is no fault of the model: the prediction is as uncertain. With J the block's slopes,
-    C the covariance of the parameters without it and r its residual in the fit to all,
-    the residual left out is S r with S = 1 + J C Jᵀ, and S is also its covariance. So
-    its density has rᵀ S r and log |S| (G. A. F. Seber and A. J. Lee, *Linear Regression
-    Analysis*, 2003, chapter 10), and neither needs a matrix of the block's size.
+    A parameter that only this block shows is then undetermined, and the block's errors
+    may be very large. That is no fault of the model: the prediction is as uncertain.
+    With J the block's slopes, C the covariance of the parameters without it and r its
+    residual in the fit to all, the residual left out is S r with S = 1 + J C Jᵀ, and S
+    is also its covariance. So its density has rᵀ S r and log |S| (G. A. F. Seber and A. J.
+    Lee, *Linear Regression Analysis*, 2003, chapter 10), and neither needs a matrix of the block's size.
     """
     theta = problem.parameters.from_unit(end.point)
     weighing = likelihood_at(problem, theta, end.numbers)

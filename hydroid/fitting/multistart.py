@@ -22,13 +22,13 @@ from operator import itemgetter
 import numpy as np
 from numpy.random import Generator
 
+from hydroid.arrays import Array
 from hydroid.fitting.baselines import NAMES, fit_baselines
 from hydroid.fitting.checkpoints import Checkpoints, Memo
 from hydroid.fitting.first_answer import first_answer
 from hydroid.fitting.refinement import Refining, refine
 from hydroid.fitting.starts import by_numbers, by_speeds
 from hydroid.fitting.step import Step
-from hydroid.parameters import Array
 from hydroid.posterior.error_model import Likelihood, make_likelihood
 from hydroid.problem.problem import Problem
 from hydroid.progress import LOGGER, NOTE
@@ -130,7 +130,7 @@ class Multistart:
         for joint in lone_joints(self._problem):
             problem = alone(self._problem, joint, theta)
             step = Step("start", start=number + 1, joint=joint)
-            ends = [*problem.settings.arm.ranges.values()][joint - 1]
+            ends = problem.settings.arm.stops(joint)
             simple = fit_baselines(problem.logs, joint, ends)
             start = by_numbers(problem, joint, theta, simple[NAMES[-1]])
             tried = [self._grown(problem, start, step.changed(numbers=True))]

@@ -20,7 +20,7 @@ from hydroid.arrays import Array, Limits, Mask, record
 from hydroid.log import Log, one_size
 from hydroid.log.command_sizes import LEAST_COMMAND
 
-LONGEST_DELAY = 0.8
+LONGEST_SEEN_DELAY = 0.8
 """between a command and its motion [s]"""
 WINDOW = 0.15
 """over which a speed is measured, at least a sample to each side [s]"""
@@ -99,7 +99,7 @@ def measured_speeds(logs: Sequence[Log], joint: int) -> SpeedCurve | None:
     reach = (float(angles.min()), float(angles.max()))
     period = min(log.period for log in own)
     # a finer delay than a sample makes no difference to the pairs
-    delays = np.arange(0.0, LONGEST_DELAY, period).tolist()
+    delays = np.arange(0.0, LONGEST_SEEN_DELAY, period).tolist()
     # which delay is right is seen where commands change, and how fast it moves where
     # they do not
     left = list[tuple[float, float]]()

@@ -94,7 +94,7 @@ def valve_alone(
     shown = by_speeds(problem, joint, anew)
     # without a curve, or where logs show none, nine numbers do
     if shown is anew:
-        ends = [*problem.settings.arm.ranges.values()][joint - 1]
+        ends = problem.settings.arm.stops(joint)
         simple = fit_baselines(problem.logs, joint, ends)
         if NAMES[-1] in simple:
             shown = by_numbers(problem, joint, anew, simple[NAMES[-1]])

@@ -53,7 +53,7 @@ FLAT = 3.0
 in doubt [%]"""
 MEMORY = 1.5
 """for how long an error counts [s]"""
-USUAL_LAG = 0.1
+LAG_BESIDE_DELAY = 0.1
 """of a valve and its oil without any delay [s]"""
 ROUNDS = 2
 """searches for a valve that a joint follows, each with the noise that the one before
@@ -228,8 +228,8 @@ class _Following:
         """Return the most likely one; it begins at the sides, and at a delay that has
         the lag in it [s]."""
         forth, back = self._sides
-        sooner = max(delay - USUAL_LAG, 0.0)
-        begin = np.array([*_begin(forth), *_begin(back), sooner, USUAL_LAG])
+        sooner = max(delay - LAG_BESIDE_DELAY, 0.0)
+        begin = np.array([*_begin(forth), *_begin(back), sooner, LAG_BESIDE_DELAY])
         least = np.array([*LEAST, *LEAST, 0.0, 0.0])
         most = np.array([*MOST, *MOST, 1.0, 0.6])
         scale = np.array([*SCALE, *SCALE, 0.05, 0.05])

@@ -9,7 +9,7 @@ from hydroid.log.clues import CLUES, RAW, column_unit
 from hydroid.log.conditions import is_condition
 from hydroid.log.likely_units import is_within, likely_unit
 from hydroid.log.log import LogFinding
-from hydroid.log.repair import FINER, GAP, SHORTEST, sample_period
+from hydroid.log.repair import FINER, GAP, of_periods, sample_period, shortest
 from hydroid.log.sensors import check_sensors
 from hydroid.log.signals import (
     CommandRange,
@@ -87,16 +87,21 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
     period = sample_period(time)
     # held commands would not explain the motion between samples that are farther apart
     slowest = 10 * settings.period_s
-    if duration < SHORTEST or period > slowest:
-        kind = "too short" if duration < SHORTEST else "too slow"
+    least = shortest(settings)
+    if duration < least or period > slowest:
+        kind = "too short" if duration < least else "too slow"
         numbers = {
             "duration": duration,
             "samples": float(len(times)),
             "period": period,
             "slowest": slowest,
+            "least": least,
         }
-        remedy = _time_remedy(recording, period, duration)
-        yield recording.finding("error", kind, (), signal, remedy=remedy, **numbers)
+        words = {
+            "remedy": _time_remedy(recording, period, duration, least),
+            "of_periods": of_periods(settings),
+        }
+        yield recording.finding("error", kind, (), signal, **words, **numbers)
         return
     # gaps are spoken of where they split the log
     steps = steps[steps <= GAP * period]
@@ -112,16 +117,18 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
         )
 
 
-def _time_remedy(recording: Recording, period: float, duration: float) -> str:
+def _time_remedy(
+    recording: Recording, period: float, duration: float, least: float
+) -> str:
     """Return what to do about a period and a duration [s] that no log has.
 
-    Another unit may explain them if the log is then long enough; it is the last thing
-    to think of where the file states the unit.
+    Another unit may explain them if the log then has the least duration; it is the last
+    thing to think of where the file states the unit.
     """
     signal = recording.signals[0]
     unit = likely_time_unit(period / signal.gain)
     in_unit = UNITS[unit].factor / signal.gain if unit else 1.0
-    if in_unit == 1 or duration * in_unit < SHORTEST:
+    if in_unit == 1 or duration * in_unit < least:
         return "take more samples, or check log.time.unit and log.period_s"
     hint = f"if its unit is {unit}, set log.time.unit: {unit}"
     stated = _stated_unit(recording, signal)

@@ -21,7 +21,7 @@ END = 0.02
 """part of a joint's travel that counts as its end"""
 MOVING = 0.2
 """part of a joint's speed above which it moves"""
-USUAL_LAG = 0.25
+USUAL_LATENESS = 0.25
 """how much later than its command a joint moves, by valve and oil [s]"""
 LONGEST_LAG = 0.8
 """that is looked for [s]"""
@@ -81,7 +81,7 @@ class JointMotion:
     def directed(self) -> tuple[float, float]:
         """Its way under strong commands [deg], and the share of this against them; 0 if
         it is too short."""
-        lag = round(USUAL_LAG / self.log.period)
+        lag = round(USUAL_LATENESS / self.log.period)
         smooth_command, _, speed = self._slow
         command = smooth_command[: len(smooth_command) - lag]
         steps = np.rad2deg(speed[lag:]) * self.log.period

@@ -30,6 +30,8 @@ BRIDGED = 3.05
 """in periods of the samples or of the settings: a gap that is no longer is bridged"""
 SHORTEST = 0.5
 """duration of a log [s]"""
+LEAST_PERIODS = 5
+"""of the settings in a log: of fewer samples no motion can be seen"""
 TURN = 2 * np.pi
 ROUNDING = 1 + 1e-9
 """by which a gap may be longer than the settings allow, as its times are rounded"""
@@ -253,8 +255,8 @@ def between_gaps(
     *,
     repair: bool,
 ) -> list[Recording]:
-    """Return the parts of a recording between gaps, without those shorter than
-    SHORTEST.
+    """Return the parts of a recording between gaps, without those that are too short
+    (`shortest`).
 
     Gaps of up to two samples, or with `repair` of up to `settings.repair_s` besides the
     usual step, are none: `resample` bridges them. Raises LogError: no part is long
@@ -276,14 +278,15 @@ def between_gaps(
     gaps = 1 + np.flatnonzero(steps > bridged)
     ends = [0, *gaps.tolist(), len(time)]
     parts = list[Recording]()
+    least = shortest(settings)
     too_short = 0
     for first, end in pairwise(ends):
-        if time[end - 1] - time[first] >= SHORTEST:
+        if time[end - 1] - time[first] >= least:
             parts.append(recording.kept(slice(first, end)))
         else:
             too_short += 1
     if not parts:
-        what = f"has no part of {SHORTEST} s without a gap"
+        what = f"has no part of {least:g} s{of_periods(settings)} without a gap"
         hint = "log at a higher rate, or use --repair"
         raise LogError(what, recording.table.source, hint)
     if len(gaps):
@@ -294,11 +297,24 @@ def between_gaps(
         }
         left = ""
         if too_short:
-            left = f", {too_short} shorter than {SHORTEST:g} s left out"
+            left = f", {too_short} shorter than {least:g} s left out"
         findings.append(
             recording.finding("warning", "gap", gaps, signal, **numbers, left=left)
         )
     return parts
+
+
+def shortest(settings: LogSettings) -> float:
+    """Return how long a log, or its part between gaps, must be [s]."""
+    return max(SHORTEST, LEAST_PERIODS * settings.period_s)
+
+
+def of_periods(settings: LogSettings) -> str:
+    """Return the words for `shortest` where the settings' period decides it; else
+    none."""
+    if shortest(settings) == SHORTEST:
+        return ""
+    return f" ({LEAST_PERIODS} times log.period_s, {settings.period_s:g} s)"
 
 
 def resample(recording: Recording, settings: LogSettings, joints: int) -> Log:

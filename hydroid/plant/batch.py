@@ -61,6 +61,7 @@ class PlantRows(NamedTuple):
     state: Any  # (n, J), of JOINT_STATE
     commands: Array  # (n, past + steps, J)
     torque: Array  # (n, steps, P)
+    links: Structs  # (n, V + 1) of LINK, or (n, 0), as of `Handles`
     angle: Array  # (n, 1, V)
     failed: Mask  # (n,)
 
@@ -92,7 +93,7 @@ def _roll_some(rows, shared, plugin, plants, roll) -> None:
     """
     joints = shared.angle.size
     entries = shared.mass.size
-    bodies = shared.links.size
+    bodies = plants.links.shape[1]
     # a warning of MuJoCo's has two numbers: every other one is its count
     numbers = 2 * shared.warnings.size - 1
     nothing = np.empty((0, 0))
@@ -115,7 +116,7 @@ def _roll_some(rows, shared, plugin, plants, roll) -> None:
             bare_armature=shared.bare_armature,
             pushed=shared.pushed,
             steps=shared.steps,
-            links=shared.links,
+            links=plants.links[i],
             body_mass=_floats(at[7], bodies),
             body_centre=_floats(at[8], 3 * bodies).reshape((bodies, 3)),
             slack=_floats(at[9], joints),
@@ -290,10 +291,14 @@ class PlantBatch:
     def restore(self, row: int, state: "RowState") -> None:
         """Put the plant of a row where it stood; it then steps to the same bits.
 
-        Its locked joints must stand where they stood then.
+        It takes as long as a reset where its locked joints stand elsewhere by now.
         """
         plant = self.plants[row]
         stacked = self._plant_rows
+        # locked joints are fused into the model
+        if not np.array_equal(self._pose[row, self._locked], state.pose[self._locked]):
+            plant.reset(state.pose)
+            self._take(row)
         mujoco.mj_setState(plant.model, plant.data, state.physics, PHYSICS)
         plant.data.M[:] = state.mass
         plant.data.warning.number[:] = 0
@@ -358,12 +363,14 @@ class PlantBatch:
         n = len(self)
         parts = first.parts
         self._columns = parts.columns
+        self._locked = np.setdiff1d(np.arange(len(first.names)), self._columns)
         # the joints that take commands, among those that move
         self._driven = np.flatnonzero(self._active[self._columns])
         self._coupled = parts.chain.columns
         self._pushed = parts.chain.pushed
         steps = parts.course.torque.shape[0]
         joints = len(self._coupled)
+        links = parts.arm.handles.links
         self._angle = np.empty((n, 1, len(self._columns)))
         self._pose = np.empty((n, len(first.names)))
         self._gain = np.empty((n, len(self._columns)))
@@ -374,6 +381,7 @@ class PlantBatch:
             state=np.zeros((n, joints), parts.state.dtype),
             commands=np.zeros((n, self._past + steps, joints)),
             torque=np.zeros((n, steps, len(self._pushed))),
+            links=np.zeros((n, len(links)), links.dtype),
             angle=self._angle,
             failed=np.zeros(n, np.bool_),
         )
@@ -399,6 +407,8 @@ class PlantBatch:
         stacked.addresses[row] = _addresses(plant)
         stacked.coefficients[row] = parts.plugin.coefficients
         stacked.state[row] = parts.state
+        # where its locked joints stand now
+        stacked.links[row] = parts.arm.handles.links
         stacked.commands[row] = 0.0
         stacked.failed[row] = False
         self._gain[row] = parts.gain

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hydroid.arm.model import load_model
-from hydroid.arrays import Array, record
+from hydroid.arrays import Array, Limits, record
 from hydroid.hydraulics.cylinder import rod_motion
 from hydroid.hydraulics.records import Records, coefficients
 from hydroid.log import Log, only_command
@@ -222,9 +222,7 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     arm = settings.arm
     pose = logs[0].start
     period = logs[0].period
-    shown = [log for log in logs if log.measures(joint)] or logs
-    angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
-    middle = (angles.min() + angles.max()) / 2
+    middle = sum(logged_travel(logs, joint)) / 2
     # in whole degrees or millimetres, as words say it
     middle = arm.joint(joint).shown.rounded(middle)
     command = np.zeros((2, len(pose)))
@@ -237,6 +235,14 @@ def make_bench(settings: FitSettings, logs: Sequence[Log], joint: int) -> Bench:
     negative, positive = largest_commands(logs, joint)
     reach = (positive, -negative)
     return Bench(settings, joint, middle, period, scenario, only, reach)
+
+
+def logged_travel(logs: Sequence[Log], joint: int) -> Limits:
+    """Return the ends of a joint's travel in all logs [rad]; of one that no log
+    measures those of what the model has."""
+    shown = [log for log in logs if log.measures(joint)] or logs
+    angles = np.concatenate([log.posed[:, joint - 1] for log in shown])
+    return float(angles.min()), float(angles.max())
 
 
 def actuator(bench: Bench, candidates: Candidates) -> tuple[Records, Array, Array]:

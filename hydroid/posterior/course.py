@@ -48,7 +48,7 @@ def make_course(channel: Channel, log: Log, problem: Problem) -> Course:
     stops = np.zeros(len(channel.measured), dtype=bool)
     readings = np.inf
     if channel.quantity == "angle":
-        ends = [*problem.settings.arm.ranges.values()][joint]
+        ends = problem.settings.arm.stops(joint + 1)
         stops = at_stops(channel.measured, ends, log.period)
         if channel.joint in problem.started(log) and problem.settings.free_start:
             readings = max(float(log.start_samples[joint]), 1.0)

@@ -144,7 +144,7 @@ def _before_the_end(bench: Bench, angles: Array) -> int:
     """Return how many of the angles after a step, (samples,), come before an end of the
     joint's range.
     """
-    lower, upper = [*bench.settings.arm.ranges.values()][bench.joint - 1]
+    lower, upper = bench.settings.arm.stops(bench.joint)
     margin = 0.0
     if np.isfinite(upper - lower):
         margin = MARGIN * (upper - lower)

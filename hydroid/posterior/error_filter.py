@@ -61,19 +61,19 @@ class Filter(NamedTuple):
     def innovations(self, errors: Array) -> Array:
         """Return the innovations [1] of errors, (n, T): 0 where a sample does not
         count."""
-        return _innovations(np.ascontiguousarray(errors), *self)
+        return _innovations(np.ascontiguousarray(errors), *self[:3])
 
     def errors(self, innovations: Array) -> Array:
         """Return the errors, (n, T), that leave these innovations.
 
         Of samples that do not count it is what those before foretell.
         """
-        return _errors(np.ascontiguousarray(innovations), *self)
+        return _errors(np.ascontiguousarray(innovations), *self[:3])
 
     def adjoint(self, rows: Array) -> Array:
         """Return rows that give the same products with errors as `rows`, (p, T), give
         with their innovations."""
-        return _adjoint(np.ascontiguousarray(rows), *self)
+        return _adjoint(np.ascontiguousarray(rows), *self[:3])
 
     def drift_ahead(self, rows: Array) -> Array:
         """Return what a step of the drift at each sample adds to products of errors
@@ -261,9 +261,7 @@ def _gains(
 
 
 @njit(cache=True)
-def _innovations(
-    errors: Array, gain: Array, carry: Array, scale: Array, step: Array
-) -> Array:
+def _innovations(errors: Array, gain: Array, carry: Array, scale: Array) -> Array:
     """Innovations over their standard deviation, (n, T), of errors, (n, T)."""
     result = np.empty_like(errors)
     for i in range(len(errors)):
@@ -278,9 +276,7 @@ def _innovations(
 
 
 @njit(cache=True)
-def _errors(
-    innovations: Array, gain: Array, carry: Array, scale: Array, step: Array
-) -> Array:
+def _errors(innovations: Array, gain: Array, carry: Array, scale: Array) -> Array:
     """The errors, (n, T), that leave these innovations, (n, T)."""
     result = np.empty_like(innovations)
     for i in range(len(innovations)):
@@ -297,9 +293,7 @@ def _errors(
 
 
 @njit(cache=True)
-def _adjoint(
-    rows: Array, gain: Array, carry: Array, scale: Array, step: Array
-) -> Array:
+def _adjoint(rows: Array, gain: Array, carry: Array, scale: Array) -> Array:
     """`_innovations` transposed: the same recursion from the last sample to the
     first."""
     result = np.empty_like(rows)

@@ -325,7 +325,7 @@ class DirectionTest:
         towards = self.direction.sign * bench.sense
         speed = dict(zip(COMMANDS, towards * steady.T, strict=True))
         after = self.step.speeds(candidates)
-        yield from self._stated(self._steady_figures(candidates, speed))
+        yield from self._stated(self._steady_figures(speed))
         yield from self._stated(self._step_figures(after, speed[self.rise]))
         yield from self._stated(self._full_flow(candidates, speed[100.0]))
         if self.opens_later:
@@ -352,9 +352,7 @@ class DirectionTest:
                 reach = self.bench.beyond(self.direction.sign * figure.command)
                 yield Column(name, label, figure.unit, reach=reach), figure.value
 
-    def _steady_figures(
-        self, candidates: Candidates, speed: dict[float, Array]
-    ) -> Iterator[Figure]:
+    def _steady_figures(self, speed: dict[float, Array]) -> Iterator[Figure]:
         """Return what speeds, by command, say."""
         pose = self.bench.pose
         unit = f"{self.bench.unit[1]}/s"

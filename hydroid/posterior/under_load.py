@@ -12,7 +12,7 @@ import numpy as np
 from hydroid.arrays import Array, record
 from hydroid.estimate import Interval, finite_ends
 from hydroid.log import Log
-from hydroid.posterior.bench import Bench, Direction, make_bench
+from hydroid.posterior.bench import Bench, Direction, logged_travel, make_bench
 from hydroid.posterior.column import Column, Measured
 from hydroid.posterior.posterior import Posterior
 from hydroid.posterior.quantities import (
@@ -181,7 +181,5 @@ def _speed_name(direction: Direction, part: float) -> str:
 
 def _at_ends(bench: Bench, logs: Sequence[Log], estimate: Candidates) -> list[float]:
     """Return what holds a joint against gravity at both ends of its logged travel."""
-    shown = [log for log in logs if log.measures(bench.joint)] or logs
-    angles = np.concatenate([log.posed[:, bench.joint - 1] for log in shown])
-    ends = (float(angles.min()), float(angles.max()))
+    ends = logged_travel(logs, bench.joint)
     return [float(replace(bench, angle=end).weigh(estimate)[0][0]) for end in ends]

@@ -72,7 +72,7 @@ def residual_tests(
     for i, signal in enumerate(errors.signals):
         if signal.quantity != "angle":
             continue
-        courses = _courses(errors, i)
+        courses = errors.courses_of(i)
         rows = [innovations[course.rows] for course in courses]
         used = list[Array]()
         for course, row in zip(courses, rows, strict=True):
@@ -103,14 +103,8 @@ def lasting(errors: ErrorModel, innovations: Array) -> dict[int, float]:
     result = dict[int, float]()
     for i, signal in enumerate(errors.signals):
         if signal.quantity == "angle":
-            result[signal.joint] = _lasting(_courses(errors, i), innovations)
+            result[signal.joint] = _lasting(errors.courses_of(i), innovations)
     return result
-
-
-def _courses(errors: ErrorModel, signal: int) -> list[Course]:
-    """Return the courses of a signal, given by its index."""
-    pairs = zip(errors.courses, errors.of, strict=True)
-    return [course for course, of_signal in pairs if of_signal == signal]
 
 
 def _lasting(courses: list[Course], innovations: Array) -> float:

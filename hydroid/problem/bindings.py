@@ -107,7 +107,8 @@ class Bindings:
                 # on top of what is set for all logs, but never beyond what can be
                 changed = table[:, binding.targets] + value
                 least = quantity.lowest * quantity.factor
-                table[:, binding.targets] = np.maximum(changed, least)
+                most = quantity.highest * quantity.factor
+                table[:, binding.targets] = changed.clip(least, most)
         return Candidates(joints.view(np.recarray), mass)
 
     def refuse_idle(self, driven: Mask, outputs: Sequence[int]) -> None:

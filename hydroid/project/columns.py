@@ -8,15 +8,14 @@ import numpy as np
 from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.log import Table
+from hydroid.log.angle_columns import LARGEST_RADIANS
 from hydroid.log.clues import column_unit
+from hydroid.log.likely_units import LARGEST_ANGLE, LARGEST_METRES
 from hydroid.log.signals import likely_range
 from hydroid.log.table import Signal
 from hydroid.units import likely_time_unit
 
 MOST = 60  # columns that are listed
-RADIANS = 6.3  # largest value of an angle in rad
-DEGREES = 400.0  # largest value of an angle in deg
-METRES = 50.0  # largest value of a position in m
 
 
 def column_lines(table: Table) -> tuple[str, ...]:
@@ -34,7 +33,7 @@ def column_lines(table: Table) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def holds_numbers(table: Table) -> bool:
+def holds_measurements(table: Table) -> bool:
     """Return whether two columns or more hold numbers: a time and what was measured."""
     named = {*table.names} - {""}
     of_numbers = sum(_numbers(table, name) is not None for name in named)
@@ -70,11 +69,11 @@ def _choices(values: Array, unit: str) -> Iterator[str]:
             offset = f", offset: {likely.offset:.4g}"
         yield f"a command in {likely.name} (scale: {likely.scale:.4g}{offset})"
     most = np.abs(values).max()
-    if most <= RADIANS:
+    if most <= LARGEST_RADIANS:
         yield "an angle in rad"
-    if most <= DEGREES:
+    if np.radians(most) <= LARGEST_ANGLE:
         yield "an angle in deg"
-    if most <= METRES:
+    if most <= LARGEST_METRES:
         yield "a position in m"
 
 

@@ -312,14 +312,18 @@ def _driven(
     whose angle changes; of the others say so."""
     idle = list[int]()
     for joint in joints:
-        most = max(np.abs(log.command_of(joint)).max() for log in logs)
-        if most < LEAST_COMMAND:
+        if _largest_command(logs, joint) < LEAST_COMMAND:
             idle.append(joint)
     standing = [k for k in joints if stands_still(logs, k)]
     for left_out, why in ((idle, UNDRIVEN), (standing, STANDING)):
         if left_out:
             reasons.append(f"{listed([names[k - 1] for k in left_out])}: {why}")
     return [k for k in joints if k not in (*idle, *standing)]
+
+
+def _largest_command(logs: Sequence[Log], joint: int) -> float:
+    """Return the largest command of a joint in any log, of either sign [%]."""
+    return float(max(np.abs(log.command_of(joint)).max() for log in logs))
 
 
 def _turn_commands(
@@ -421,18 +425,25 @@ def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layou
 def _refuse_rest(
     table: Table, driven: Sequence[int], logs: Sequence[Log], names: Sequence[str]
 ) -> None:
-    """Refuse logs in which no joint is driven and moves: nothing can be fitted to
-    them."""
+    """Refuse logs in which no joint is driven, by more than the noise of a lever, and
+    moves: nothing can be fitted to them."""
     travels = dict[int, float]()
+    most = 0.0
     for joint in driven:
+        largest = _largest_command(logs, joint)
+        most = max(most, largest)
         moved = [motion_of(log, joint).travel for log in logs if log.drives(joint)]
-        if moved:
+        if moved and largest >= LEAST_COMMAND:
             travels[joint] = max(moved)
     if any(travel > MOVED for travel in travels.values()):
         return
     what = "no command is ever given"
     if travels:
         what = f"{listed([names[joint - 1] for joint in travels])} driven, but nothing moves"
+    elif most > 0.0:
+        what = f"the largest command is {most:.2g} %, and below {LEAST_COMMAND:g} % it is none"
+        hint = "check the commands' unit and scale: 100 % is full command"
+        raise LogError(f"no joint is driven and moves: {what}", table.source, hint)
     hint = (
         "give a log in which a joint moves; or, if its columns were guessed wrongly, write the "
         "project without --log, name them in `log` of its fit.yaml, and repeat init with --config"

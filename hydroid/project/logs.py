@@ -27,8 +27,8 @@ class Others(NamedTuple):
     fitted: Sequence[Path] = ()
     unseen: Path | None = None
     in_range: bool = True
-    """whether they must be within the arm's ranges, if the first one is; not where
-    these ranges are guesses"""
+    """whether to leave out logs that exceed the arm's ranges, unless the first one does,
+    too; not where the ranges themselves are guesses"""
 
     def tables(self, progress: Progress) -> Iterator[Table]:
         """Yield the tables of all of them that can be opened."""

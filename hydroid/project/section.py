@@ -10,7 +10,7 @@ from hydroid.log.clues import LONGEST_NUMBER
 from hydroid.log.guess import nearest_period, usual_step
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal
-from hydroid.project.columns import holds_numbers
+from hydroid.project.columns import holds_measurements
 from hydroid.settings.arm import Arm
 from hydroid.settings.log import ColumnMap, Kind, LogSettings
 from hydroid.units import UNITS
@@ -55,7 +55,7 @@ def guessed_section(
             ranges=ranges,
         )
     except LogError:
-        if not holds_numbers(tables[0]):
+        if not holds_measurements(tables[0]):
             raise
         return ColumnGuess({"joints": {}}, (), ())
     section = guess.log

@@ -15,7 +15,7 @@ from hydroid.arm.model import load_model
 from hydroid.arrays import Array
 from hydroid.cad.importer import ImportedArm
 from hydroid.files import Plain, fill_template, yaml_text
-from hydroid.fitting.valve_start import EXPONENT, USUAL_LAG, JointStart
+from hydroid.fitting.valve_start import EXPONENT, LAG_BESIDE_DELAY, JointStart
 from hydroid.hydraulics.valve import DENSITY
 from hydroid.log import JointMotion
 from hydroid.project.layout import Layout
@@ -30,7 +30,7 @@ DEAD = 0.8
 UNKNOWN_DEAD = 10.0  # dead band of a joint that no log moves [%]
 MOST_DEAD = 85.0  # the largest dead band to start at [%]
 UNKNOWN_LAG = 0.05  # of the opening of a joint that no log moves [s]
-LONGEST_DELAY = 0.9  # to start at [s]
+LONGEST_START_DELAY = 0.9  # to start at [s]
 LONGEST_LAG = 0.5  # to start at [s]
 # part of the torque at the pump's pressure that damping takes at full speed
 DRAG = 0.02
@@ -91,8 +91,7 @@ def _torques(arm: Arm) -> Array:
     (J,)."""
     model = load_model(arm).compile()
     data = mujoco.MjData(model)
-    low = np.maximum(arm.lower, -np.pi)
-    high = np.minimum(arm.upper, np.pi)
+    low, high = arm.limits.T
     torque = np.zeros(len(arm.joints))
     # the same poses every time: a project is written twice with the same bytes
     for pose in np.random.default_rng(0).uniform(low, high, (300, len(low))):
@@ -324,7 +323,7 @@ def _joint_text(
         delay = valve.delay
         lag = valve.lag
     elif motion:
-        delay = max(motion.likely_lag - USUAL_LAG, 0.0)
+        delay = max(motion.likely_lag - LAG_BESIDE_DELAY, 0.0)
     return {
         "own": joint.name.removesuffix("_joint"),
         "name": joint.name,
@@ -337,7 +336,7 @@ def _joint_text(
         # at least none: on the logarithm of `within`, least squares does not get there,
         # and what is left of the damping bends the valve's curve
         "most_damping": short(10 * DRAG * size.damping),
-        "delay": min(delay, LONGEST_DELAY),
+        "delay": min(delay, LONGEST_START_DELAY),
         "lag": min(lag, LONGEST_LAG),
         "friction": short(FRICTION * torque),
         "most_friction": short(5 * FRICTION * torque),

@@ -106,7 +106,7 @@ def covered(settings: FitSettings, logs: Sequence[Log], joint: int) -> Covered:
         smallest=smallest_commands(logs, joint),
         switched=tuple(s for s in SIGNS if only_command(logs, joint, s) is not None),
         seconds=(_driven(logs, joint, 1.0), _driven(logs, joint, -1.0)),
-        range=[*arm.ranges.values()][joint - 1],
+        range=arm.stops(joint),
     )
 
 

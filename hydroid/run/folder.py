@@ -6,7 +6,6 @@ import os
 import platform
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from hydroid.identified_model import (
     write_settings,
 )
 from hydroid.log import Log
+from hydroid.parallel.workers import VERSIONS
 from hydroid.plant import Plant
 from hydroid.progress import LOGGER
 from hydroid.run.archive import CheckpointFile
@@ -31,9 +31,6 @@ from hydroid.run.process import LOCK, locked, run_log
 from hydroid.settings.arm import Arm
 from hydroid.settings.fit import FitSettings
 from hydroid.words import numbered
-
-VERSIONS = {name: version(name) for name in ("hydroid", "mujoco", "numpy")}
-"""those that a result is of"""
 
 
 def identity(settings: FitSettings, logs: Sequence[Log]) -> Plain:
@@ -70,9 +67,11 @@ def difference(run: Mapping[str, Any], other: Mapping[str, Any], but: str = "") 
 
     Both are identities. The setting `but` may differ.
     """
-    for key in ("hydroid", "mujoco"):
-        if run.get(key) != other.get(key):
-            return f"was made by {key} {run.get(key)}, not {other.get(key)}"
+    for key in VERSIONS:
+        # a run of an earlier hydroid names fewer of them
+        named = key in run and key in other
+        if named and run[key] != other[key]:
+            return f"was made by {key} {run[key]}, not {other[key]}"
     logs = run.get("logs", {})
     other_logs = other.get("logs", {})
     # the files may have moved

@@ -91,9 +91,6 @@ class IntegerCoding:
         return self.random(len(chromosomes), rng)
 
 
-Coding = GrayCoding | IntegerCoding
-
-
 def _nearest(points: Array) -> Ints:
     inside = np.clip(points, 0, 1)
     return np.rint(inside * STEPS).astype(np.int64)
@@ -162,7 +159,12 @@ def crossover(parents: Genes, settings: GeneticSettings, rng: Generator) -> Gene
     return children
 
 
-def mutate(chromosomes: Genes, rate: float, coding: Coding, rng: Generator) -> Genes:
+def mutate(
+    chromosomes: Genes,
+    rate: float,
+    coding: GrayCoding | IntegerCoding,
+    rng: Generator,
+) -> Genes:
     """Mutate each element (each parameter) of each chromosome, (n, length),
     with chance P_m = `rate`.
 

@@ -11,7 +11,6 @@ from numpy.random import Generator
 
 from hydroid.arrays import Array, Ints, record
 from hydroid.search.chromosomes import (
-    Coding,
     Genes,
     GrayCoding,
     IntegerCoding,
@@ -105,7 +104,7 @@ class SimpleGa:
         return self.settings.generations
 
     @property
-    def coding(self) -> Coding:
+    def coding(self) -> GrayCoding | IntegerCoding:
         """How candidates are written as chromosomes."""
         kind = GrayCoding if self.settings.coding == "binary" else IntegerCoding
         return kind(self.parameters)

@@ -246,6 +246,10 @@ class Arm(Settings):
             for joint in self.joints
         }
 
+    def stops(self, joint: int) -> Limits:
+        """Return the `ranges` of a joint by its number, from 1."""
+        return self.ranges[self.name_of(joint)]
+
     @property
     def slides(self) -> tuple[int, ...]:
         """Joints, from 1, that slide."""
@@ -274,6 +278,15 @@ class Arm(Settings):
     def upper(self) -> Array:
         """Upper joint stops [rad], shape (J,)."""
         return np.array([high for _, high in self.ranges.values()])
+
+    @property
+    def limits(self) -> Array:
+        """Ends of the range of each joint, in which it is shown and tested [rad], or
+        [m] of a slide, shape (J, 2).
+
+        They are finite: of a joint without stops once round, or 1 m to both sides.
+        """
+        return np.array([joint.limits for joint in self.joints])
 
     def pose(self, name: str) -> Array:
         """Return a named pose [rad], shape (J,)."""

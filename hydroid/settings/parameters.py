@@ -115,7 +115,7 @@ def _prior(
 
 def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> Limits:
     """Return the bounds of a parameter that states none: four standard deviations of
-    its prior."""
+    its prior, within what the quantity can be."""
     if prior is None:
         held = settings.fixed or 0.0
         return held, held
@@ -128,7 +128,7 @@ def _default_bounds(settings: ParameterSettings, prior: Prior | None) -> Limits:
     if quantity.positive:
         # what must be above 0 is not searched below 1 % of its value
         least = 0.01 * prior.nominal
-    return max(lower, least), upper
+    return max(lower, least), min(upper, quantity.highest)
 
 
 def _unit(arm: Arm, settings: ParameterSettings) -> str:

@@ -41,7 +41,7 @@ class ParameterSettings(Settings):
     """link whose mass the parameter is"""
     bounds: Limits | None = None
     """lower and upper bound, in the unit of the quantity; null:
-    four standard deviations of the prior"""
+    four standard deviations of the prior, as far as the quantity can be so"""
     nominal: float | None = None
     """expected value, in the unit of the quantity; null:
     what `hydraulics` or the arm's file says"""
@@ -127,25 +127,34 @@ class ParameterSettings(Settings):
     def _check_values(self) -> None:
         """Raise ValueError where bounds, nominal value, start or fixed value cannot
         be."""
-        # an effect of a group is added to a quantity, so it may be of either sign
-        least = -math.inf if self.per is not None else CHOICES[self.quantity].lowest
-        lower, upper = self.bounds or (least, math.inf)
+        lower, upper = self.bounds or (-math.inf, math.inf)
         if lower >= upper:
             raise ValueError("bounds must be [lower, upper] with lower < upper")
-        self._check_lowest(least)
+        self._check_limits()
         for name, value in (("nominal", self.nominal), ("start", self.start)):
             if value is None or lower <= value <= upper:
                 continue
             raise ValueError(f"{name} {value:g} lies outside the bounds")
 
-    def _check_lowest(self, least: float) -> None:
-        """Raise ValueError where any value is lower than the quantity can be."""
-        stated = [*(self.bounds or ()), self.nominal, self.start, self.fixed]
-        lowest = min((value for value in stated if value is not None), default=1.0)
-        if self.quantity == "mass" and lowest <= 0:
+    def _check_limits(self) -> None:
+        """Raise ValueError where any value is beyond what the quantity can be."""
+        given = [*(self.bounds or ()), self.nominal, self.start, self.fixed]
+        stated = [value for value in given if value is not None]
+        if not stated:
+            return
+        if self.quantity == "mass" and min(stated) <= 0:
             raise ValueError("a mass must be above 0 kg")
-        if lowest < least:
-            limit = f"below {least:g}" if least else "negative"
+        if self.per is not None:
+            # an effect of a group is added to the quantity: it may be of either sign
+            return
+        quantity = CHOICES[self.quantity]
+        least = quantity.lowest
+        most = quantity.highest
+        if min(stated) < least:
+            limit = f"below {least:g} {self.unit}".rstrip() if least else "negative"
+            raise ValueError(f"{self.quantity} cannot be {limit}")
+        if max(stated) > most:
+            limit = f"above {most:g} {self.unit}".rstrip()
             raise ValueError(f"{self.quantity} cannot be {limit}")
 
     @property

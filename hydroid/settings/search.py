@@ -154,7 +154,7 @@ class DesignSettings(Settings):
     """standard deviation of the drift of a prediction after 10 s [deg]; 0: white noise
     alone"""
     effort: Annotated[int, Field(ge=2, le=1_000_000)] = 240
-    """number of experiments that are tried: one in six drawn at random,
+    """number of experiments that are tried: one in six, but 8 at least, drawn at random,
     the others changes of the best"""
 
     @model_validator(mode="after")

@@ -44,8 +44,6 @@ POSES = 256
 that is ready takes a hundredth of a reset"""
 LEAST_POSES = 4
 """of these, each machine has as many at least"""
-ENDLESS = np.pi
-"""end of the range of a joint that turns without end [rad]"""
 LARGEST = 10.0
 """of an observation, whose machine may diverge"""
 MARGIN = 0.1
@@ -88,8 +86,7 @@ class _Machines:
             plants.append(plant)
         self.batch = PlantBatch(plants, threads=threads)
         self._columns = np.array(self.joints) - 1
-        ranges = np.clip([arm.lower, arm.upper], -ENDLESS, ENDLESS)
-        low, high = ranges[:, self._columns]
+        low, high = arm.limits[self._columns].T
         self._middle = 0.5 * (low + high)
         self._half = 0.5 * (high - low)
         self._pose = arm.pose(settings.start_pose)
@@ -340,7 +337,8 @@ class VectorEnv(GymnasiumVectorEnv[Floats, Floats, Any]):
         every = np.ones(self.num_envs, dtype=bool)
         rows = np.flatnonzero(options.get("reset_mask", every)).tolist()
         self._machines.begin(rows, self.np_random, options)
-        self._over[:] = False
+        # the others are over still, and begin anew with the next step
+        self._over[rows] = False
         return self._machines.observe(self.np_random), {}
 
     def step(self, actions: Floats) -> tuple[Floats, Array, Any, Any, dict[str, Any]]:

@@ -23,7 +23,7 @@ from hydroid.mjcf import mjcf_text
 from hydroid.plant import Plant
 from hydroid.robot_xml import read_robot
 from hydroid.use.follow import joint_lags
-from hydroid.use.tables import COMMANDS, joint_range, speeds_alone
+from hydroid.use.tables import COMMANDS, speeds_alone
 
 ANGLES = 15
 """of a joint in its table of speeds"""
@@ -204,7 +204,7 @@ def speed_grids(plant: Plant) -> dict[str, Array]:
     joint alone."""
     grids = dict[str, Array]()
     for column in [joint - 1 for joint in plant.joints]:
-        low, high = joint_range(plant, column)
+        low, high = plant.identified.settings.arm.limits[column]
         angles = np.linspace(low, high, ANGLES)
         angle = np.repeat(angles, len(COMMANDS))
         command = np.tile(COMMANDS, ANGLES)

@@ -14,8 +14,6 @@ COMMANDS = np.concatenate([np.arange(-100.0, 0.0, 5.0), np.arange(0.0, 101.0, 5.
 """of a table of speeds [%]"""
 PARTS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """of a joint's range, at which a table has its speeds"""
-ENDLESS = np.pi
-"""end of the range of a joint that turns without end [rad]"""
 ERRORS_HEADER = (
     "joint",
     "unit",
@@ -57,7 +55,7 @@ def speed_tables(plant: Plant) -> dict[str, str]:
     for column in [joint - 1 for joint in plant.joints]:
         unit = arm.joints[column].shown.unit
         factor = arm.joints[column].shown.factor
-        low, high = joint_range(plant, column)
+        low, high = arm.limits[column]
         header = ["command_pct"]
         columns = [COMMANDS]
         for angle in low + np.array(PARTS) * (high - low):
@@ -69,13 +67,6 @@ def speed_tables(plant: Plant) -> dict[str, str]:
             rows.append([f"{cell:.6g}" for cell in row])
         files[f"speeds_{plant.names[column]}.csv"] = csv_text(rows)
     return files
-
-
-def joint_range(plant: Plant, column: int) -> Array:
-    """Return the ends of a joint's range [rad, m], shape (2,); `column` is its number
-    from 0."""
-    arm = plant.identified.settings.arm
-    return np.clip([arm.lower[column], arm.upper[column]], -ENDLESS, ENDLESS)
 
 
 def speeds_alone(plant: Plant, column: int, angles: Array, commands: Array) -> Array:

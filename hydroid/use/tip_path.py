@@ -32,6 +32,8 @@ REACHED = 1e-6
 UNREACHED = 1e-3
 """distance from a point from which a path is refused [m]: a valve leads no tip that
 closely"""
+MOST_SAMPLES = 200_000
+"""of a path: half an hour of them, which take minutes to compute"""
 MOST_STEPS = 300
 """steps for a sample; a path's first point, far from the start pose, takes the most"""
 DAMPING = 1e-3
@@ -168,7 +170,7 @@ def tip_path(table: Table, logs: LogSettings, tip: TipKinematics, start: Array) 
 
     Raises:
         LogError: a column of times is missing, a cell holds no number, times do not
-            increase, or a point cannot be reached.
+            increase, the path has more than MOST_SAMPLES, or a point cannot be reached.
     """
     first = tip.place(start)
     absolute = COLUMNS[0] in table.names
@@ -221,7 +223,21 @@ def _rows(
         raise LogError("times do not increase", where, hint)
     if len(values) < 2:
         raise LogError("holds no path", table.source, "give two rows at least")
+    where = f"{table.source}, {word} {lines[-1]}, column {time}"
+    _refuse_long(recording.time, logs.period_s, where)
     return recording.time, values[:, 1:]
+
+
+def _refuse_long(time: Array, period: float, where: str) -> None:
+    """Raise a LogError where a path, (n,) [s], has too many samples of a period."""
+    duration = float(time[-1] - time[0])
+    if duration / period > MOST_SAMPLES:
+        what = (
+            f"the path lasts {duration:.4g} s, {duration / period:.3g} samples of {period:g} s; "
+            f"at most {MOST_SAMPLES:,} are computed"
+        )
+        hint = "check the unit of the times, cut the path, or raise log.period_s"
+        raise LogError(what, where, hint)
 
 
 def spelt(point: Array) -> str:

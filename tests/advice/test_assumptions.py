@@ -22,6 +22,20 @@ def test_a_wrong_sign_is_named_and_no_right_one(tmp_path, wrong):
     assert names[:1] == ([("sign doubted", wrong)] if wrong else [])
 
 
+def test_a_wrong_sign_is_named_wherever_a_joint_without_stops_stands(tmp_path):
+    """Its angles may lie turns away from 0."""
+    logs = [drive(two_joints(tmp_path), seed) for seed in range(6)]
+    endless = BOOM.replace(' range="-60 60"', "")
+    turned = endless.replace('name="tilt" axis="0 -1 0"', 'name="tilt" axis="0 1 0"')
+    settings = two_joints(tmp_path, turned)
+    assert settings.arm.joint(2).continuous
+    away = np.array([0.0, 4 * np.pi])
+    far = [replace(log, angle=log.angle + away) for log in logs]
+    for several in (logs, far):
+        (found, *_) = assumption_findings(settings, several, doubts(settings, several))
+        assert (found.kind, *found.subjects) == ("sign doubted", "tilt")
+
+
 def test_exchanged_commands_are_named(tmp_path):
     settings = two_joints(tmp_path)
     log = drive(settings)

@@ -181,6 +181,7 @@ def test_defaults_classes_and_frames_are_read_as_mujoco_reads_them(tmp_path):
     compiled = load_model(arm).compile()
     assert arm.joint_names == tuple(compiled.joint(j).name for j in range(2))
     np.testing.assert_allclose([arm.lower, arm.upper], [[-0.5, -np.inf], [0.5, np.inf]])
+    np.testing.assert_allclose(arm.limits, [[-0.5, 0.5], [-np.pi, np.pi]])
     assert compiled.jnt_limited.tolist() == [1, 0]
     assert arm.link_names == ("boom", "bar", "hook")
     np.testing.assert_allclose(

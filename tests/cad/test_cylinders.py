@@ -21,6 +21,15 @@ TAIL, BUCKET = np.array([0.3, 0.45]), np.array([2.0, 0.0])
 """of the bucket's cylinder on the stick; the bucket's joint"""
 
 
+LINKAGE = """<mujoco model="linkage"><worldbody><body name="house">
+  <geom type="box" size=".2 .2 .2" mass="50"/>
+  <body name="boom" pos="0 0 .5"><joint name="boom" axis="0 1 0" range="-57 57"/>
+    <geom type="box" pos=".5 0 0" size=".5 .1 .1" mass="100"/>{E}{F}{G}
+    <body name="bucket" pos="1 0 0"><joint name="bucket" axis="0 1 0" range="-20 20"/>
+      <geom type="box" pos=".2 0 0" size=".2 .1 .1" mass="40"/>{H}
+  </body></body></body></worldbody></mujoco>"""
+
+
 def written(folder):
     """The file: rods point from their feet to their eyes, pinned to rocker and coupler
     in one point."""
@@ -44,6 +53,38 @@ def actuator(arm, name) -> LinearActuator:
     model, data = compiled(arm)
     own = Cylinder(**arm.cylinders[name], area_a=1000, area_b=600, max_opening=1)
     return make_cylinder(own, tuple(model.joint(name).range), data, name)
+
+
+PINS = {"E": (0.2, 0.3), "F": (0.8, 0.3), "G": (0.85, 0.05), "H": (1.1, 0.15)}
+"""of a good linkage, in the boom's frame, whose bucket turns at (1, 0) [m]"""
+
+
+@pytest.mark.parametrize(
+    "moved",
+    [
+        {"G": (1, 0)},
+        {"F": PINS["G"]},
+        {"F": PINS["H"]},
+        {"H": (1, 0)},
+        {"E": PINS["G"]},
+    ],
+    ids=str,
+)
+def test_a_linkage_whose_pins_coincide_is_left_out_and_named(tmp_path, moved):
+    def import_linkage(pins):
+        sites = {
+            name: f'<site name="{name}" pos="{x - (name == "H")} 0 {z}"/>'
+            for name, (x, z) in pins.items()
+        }
+        path = tmp_path / "linkage.xml"
+        path.write_text(LINKAGE.format(**sites))
+        return import_arm(path)
+
+    assert "bucket" in import_linkage(PINS).cylinders
+    arm = import_linkage(PINS | moved)
+    assert arm.cylinders == {}
+    said = "bucket: its four-bar linkage does not close, or two of its pins coincide: left out"
+    assert said in arm.notes
 
 
 def test_angles_count_from_the_joints_own_zero(arm, tmp_path):

@@ -187,6 +187,18 @@ def test_parts_shorter_than_half_a_second_are_left_out_and_counted(
     assert "no part of 0.5 s without a gap" in fault.what
 
 
+def test_a_log_has_several_of_the_settings_periods(tmp_path: Path) -> None:
+    path, _ = dropped(tmp_path)
+    period = 1.0
+    coarse = SETTINGS.changed({"period_s": period})
+    parts, findings = check_parts(path, coarse, RANGES)
+    assert not parts
+    (fault,) = [one for one in findings if one.level == "error"]
+    assert "at least 5 s (5 times log.period_s, 1 s) is needed" in fault.what
+    less = coarse.changed({"period_s": 0.5})
+    assert len(check_parts(path, less, RANGES)[0]) == 1
+
+
 def test_a_gap_that_is_short_against_the_new_period_does_not_split(
     tmp_path: Path,
 ) -> None:

@@ -77,7 +77,7 @@ def test_a_step_is_shown_up_to_the_end_of_the_range_and_slow_commands_are_follow
         [column.at for column, _ in points if column.name == "step_positive"]
     )
     angles = step.angles(estimate)[0]
-    upper = [*bench.settings.arm.ranges.values()][1][1]
+    upper = bench.settings.arm.stops(2)[1]
     assert np.all(
         np.interp(times, bench.period * np.arange(len(angles)), angles) < upper
     )

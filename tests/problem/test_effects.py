@@ -13,6 +13,7 @@ from hydroid.errors import HydroidError
 from hydroid.identified_model import identified
 from hydroid.log import Log
 from hydroid.prediction import predict
+from hydroid.problem.bindings import Bindings
 from hydroid.problem.problem import Problem
 from hydroid.settings.fit import FitSettings
 from hydroid.settings.search import RefinementSettings
@@ -47,6 +48,15 @@ def fitted(tmp_path_factory) -> tuple[Problem, np.ndarray]:
     problem = Problem(of_days(folder), logs_of_days(folder))
     start = problem.parameters.started(TRUTH)
     return problem, refined(problem, start, RefinementSettings(iterations=20))
+
+
+def test_an_effect_takes_a_quantity_no_further_than_it_can_be(tmp_path):
+    settings = of_days(tmp_path)
+    parameters = settings.parameter_set()
+    effects = np.full((2, len(parameters.names)), parameters.start)
+    effects[:, parameters.names.index("day_monday")] = [-500.0, 500.0]
+    joints = Bindings(settings).candidates(effects, "mon_1.csv").joints
+    assert joints.dead_band_a[:, 0].tolist() == [0.0, 99.0]
 
 
 def test_effects_of_two_groups_are_recovered(fitted):

@@ -449,6 +449,22 @@ def test_a_log_in_which_nothing_is_driven_and_moves_is_refused(
     assert not (tmp_path / "mine").exists()
 
 
+def test_commands_that_are_the_noise_of_a_lever_are_refused(place, tmp_path):
+    def small(rows: list[list[str]]) -> None:
+        largest = max(abs(float(cell)) for row in rows[1:] for cell in row[1:4])
+        for row in rows[1:]:
+            row[1:4] = [f"{1.5 * float(cell) / largest:.4f}" for cell in row[1:4]]
+        rows[0][1:4] = ["swing_pct", "boom_pct", "stick_pct"]
+
+    log = renamed(place, tmp_path / "log.csv", small)
+    says = (
+        r"log.csv: no joint is driven and moves: the largest command is 1\.5 %, .*scale"
+    )
+    with pytest.raises(LogError, match=says):
+        init(tmp_path / "mine", place / "digger/urdf/digger.urdf", [log])
+    assert not (tmp_path / "mine").exists()
+
+
 @pytest.mark.usefixtures("short_searches")
 def test_a_joint_that_no_fitted_log_drives_is_not_compared(place: Path, tmp_path: Path):
     def only_the_boom(rows: list[list[str]]) -> None:

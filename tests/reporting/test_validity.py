@@ -64,7 +64,7 @@ def test_nothing_is_asked_for_that_the_logs_have():
     log = log_of([0.0, 0.0])
     command = log.command.copy()
     command[:, [1, 2]] = np.array([*zip(*ramp, strict=True)] * 2)
-    low, high = [*PROBLEM.settings.arm.ranges.values()][1]
+    low, high = PROBLEM.settings.arm.stops(2)
     angle = np.linspace(low, high, 200)[:, None] * np.ones(log.joints)
     log = replace(log, command=command, angle=angle)
     unseen = {f"{n}": make_prediction(log, joints=(2, 3)) for n in range(4)}

@@ -2,6 +2,7 @@
 line."""
 
 import errno
+import json
 import os
 import resource
 import shutil
@@ -207,6 +208,22 @@ def test_a_run_of_another_arm_or_model_is_refused(folder, path, tmp_path):
     model.write_text(text)
     with pytest.raises(RunError, match="another model"):
         folder.begin(*other(model=model))
+
+
+@pytest.mark.parametrize("name", ["hydroid", "mujoco", "numpy", "numba"])
+def test_a_run_of_other_versions_is_refused_and_an_old_one_goes_on(folder, path, name):
+    logs = read_logs([path], SETTINGS)
+    file = folder.path / "run.json"
+    described = folder.identity()
+    file.write_text(json.dumps(described | {name: "0.0"}))
+    with pytest.raises(RunError, match=rf"was made by {name} 0\.0, not \d"):
+        folder.begin(SETTINGS, logs)
+    # runs of earlier versions do not say theirs of numba
+    del described[name]
+    for checkpoint in folder.path.glob("checkpoint*"):
+        checkpoint.unlink()  # of the whole description
+    file.write_text(json.dumps(described))
+    folder.begin(SETTINGS, logs)
 
 
 def test_a_log_that_has_moved_is_the_same_log_and_another_is_named(

@@ -50,6 +50,8 @@ def test_bounds_follow_from_the_prior():
     wide = parameter(name="A", quantity="onset_a", joints=[2], nominal=1.0, sd=0.5)
     assert (wide.lower, wide.upper) == (0.0, 3.0)
     assert not wide.log
+    band = parameter(quantity="dead_band", joints=[2], nominal=40, within=4)
+    assert band.upper == 99.0
     mass = parameter(name="M3", quantity="mass", link="link3", sd=10)
     assert mass.lower == pytest.approx(0.225)
     assert mass.log
@@ -70,6 +72,9 @@ def test_bounds_follow_from_the_prior():
         ),
         ({"nominal": 0.0, "within": 2}, "nominal value above 0"),
         ({"nominal": -1.0, "sd": 2}, "cannot be negative"),
+        ({"quantity": "lever_slope", "fixed": -1}, "cannot be below -0.9"),
+        ({"quantity": "compensation", "fixed": 7}, "cannot be above 1"),
+        ({"quantity": "dead_band", "bounds": [0, 150]}, "cannot be above 99 %"),
         ({"each": True, "within": 2}, "not both"),
         ({"quantity": "pump_flow", "bounds": [1, 2]}, "all joints share the pump"),
         ({"quantity": "curve_a", "start": 2.0}, "a list of 4 factors"),

@@ -83,6 +83,21 @@ def test_a_vector_of_machines_is_one_call(model):
     np.testing.assert_array_equal(several.reset(seed=3)[0], first)
 
 
+def test_a_reset_of_some_machines_leaves_the_others_over(model):
+    several = VectorEnv(model, 3, seed=None, seconds=0.5, errors=False)
+    several.reset(seed=3)
+    action = np.tile(np.array([0.4, -0.4], np.float32), (3, 1))
+    truncated = np.zeros(3, dtype=bool)
+    for _ in range(10):
+        _, _, _, truncated, _ = several.step(action)
+    assert truncated.all()
+    several.reset(options={"reset_mask": np.array([True, False, False])})
+    _, reward, _, truncated, _ = several.step(action)
+    # the others begin with this step, which moves none of them
+    assert (reward == 0.0).tolist() == [False, True, True]
+    assert not truncated.any()
+
+
 def test_a_machine_that_diverges_ends_its_episode(model):
     """No observation is NaN, and the next episode is as any other."""
     env = Env(model)

@@ -15,10 +15,11 @@ from made_models import VALUES, made_model
 
 import hydroid
 from hydroid import load_settings
-from hydroid.errors import HydroidError
+from hydroid.errors import HydroidError, ModelError
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import write_log
 from hydroid.plant import Plant, load_plant
+from hydroid.use.tables import speed_tables
 
 URDF = Path(__file__).parents[2] / "examples" / "urdf"
 
@@ -52,6 +53,17 @@ def test_a_table_holds_the_settled_speeds(model, tmp_path):
                     plant.speeds({"shoulder": float(row["command_pct"])}, at=pose)[1]
                 )
                 assert float(cell) == pytest.approx(speed, rel=2e-3)
+
+
+def test_a_table_covers_the_whole_range_of_a_telescope(tmp_path):
+    crane = tmp_path / "crane"
+    hydroid.init(crane, joints=["swing", "boom", "telescope"], lengths=[0, 6, 6])
+    plant = load_plant(str(crane / "fit.yaml"))
+    low, high = plant.identified.settings.arm.ranges["telescope"]
+    assert high - low > np.pi  # metres
+    table = speed_tables(plant)["speeds_telescope.csv"]
+    last = table.splitlines()[0].rsplit(",", 1)[-1]
+    assert last == f"mm_per_s_at_{1e3 * (low + 0.9 * (high - low)):.4g}_mm"
 
 
 def test_draws_of_a_fit_are_written_with_ranges_and_errors(tmp_path):
@@ -203,6 +215,29 @@ def test_a_link_without_a_mass_is_named(
     plant = load_plant(tmp_path / "mine" / "fit.yaml")
     hydroid.export(plant.identified, to="urdf", robot=tmp_path / "robot.urdf")
     assert "robot.urdf: states no mass of stick: the fit's is not" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            ('value="150.0"', 'value="${m}"'),
+            r"link 'stick', mass: value=\"\$\{m\}\" must",
+        ),
+        (('iyy="150.0"', 'iyy="x309"'), r"link 'stick', inertia: iyy=\"x309\" must be"),
+        (('izz="150.0"', 'izz="nan"'), r"link 'stick', inertia: izz=\"nan\" must be"),
+    ],
+)
+def test_a_urdf_whose_masses_are_no_numbers_is_refused(tmp_path: Path, change, says):
+    path = tmp_path / "robot.urdf"
+    path.write_text(machine())
+    hydroid.init(tmp_path / "mine", arm=path)
+    plant = load_plant(tmp_path / "mine" / "fit.yaml")
+    assert change[0] in machine()
+    path.write_text(machine().replace(*change))
+    with pytest.raises(ModelError, match=says):
+        hydroid.export(plant.identified, to="urdf", robot=path, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_plain_mujoco_moves_the_mjcf_as_the_plant_moves(model, tmp_path):

@@ -148,9 +148,20 @@ def without_number(place):
     return rows
 
 
+def endless(place):
+    rows = line(place, [0.03, 0.0, 0.0])
+    rows[-1, 0] = 1e16
+    return rows
+
+
 @pytest.mark.parametrize(
     ("rows", "header", "says"),
     [
+        (
+            endless,
+            "time_s,x_m,y_m,z_m",
+            r"line \d+, column time_s: the path lasts 1e\+16 s",
+        ),
         (
             beyond,
             "time_s,x_m,y_m,z_m",

@@ -370,3 +370,29 @@ def test_two_arms_keep_their_columns_apart(tmp_path: Path) -> None:
         assert boom["angle"]["column"] == f"{side}_boom_deg"
         assert 2 not in found.log["joints"]
         assert {f"{other}_boom_cmd", f"{other}_boom_deg"} <= {*found.unused}
+
+
+@pytest.mark.parametrize(
+    ("shift", "limits", "offset"),
+    [
+        (360, (-130, -20), -360),
+        (360, (-10, 20), -360),
+        (0, (-130, -20), 0),
+        (360, (180, 340), 0),
+    ],
+    ids=["in its range", "in no range", "negative", "a range beyond half a turn"],
+)
+def test_angles_from_0_to_360_are_moved_by_a_turn(
+    shift: float, limits: tuple[float, float], offset: float, tmp_path: Path
+) -> None:
+    """Angles of -80 to -40 deg, as a sensor counts them that has no negative ones."""
+    log = tmp_path / "log.csv"
+    angle = SWEEP - 60 + shift
+    header = "t,stick_cmd,stick_deg"
+    np.savetxt(
+        log, np.stack([T, STEPS, angle], 1), delimiter=",", header=header, comments=""
+    )
+    low, high = np.radians(limits).tolist()
+    found = guess_columns([open_table(log)], ["stick"], ranges={1: (low, high)})
+    assert found.log["joints"][1]["angle"].get("offset", 0) == offset
+    assert any("a whole turn" in reason for reason in found.reasons) == bool(offset)

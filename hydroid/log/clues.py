@@ -25,7 +25,8 @@ LONGEST_NUMBER = 2
 def words(name: str) -> list[str]:
     """Return the words of a column's name in lower case: "valveCmd_2 [V]" gives valve,
     cmd, 2, v."""
-    found = re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
+    # "mA" is one word, though it looks like two
+    found = re.findall(r"m[AV](?![A-Za-z])|[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
     return [word.lower() for word in found]
 
 
@@ -174,7 +175,11 @@ def number_in(name: str) -> int | None:
 
 def direction(name: str) -> tuple[int, frozenset[str]]:
     """Return +1, −1 or 0 for the direction that a name tells, and its other words."""
-    in_name = frozenset(words(name))
+    in_order = words(name)
+    # "coil_B [A]" is the current of side B
+    if in_order[-1:] == ["a"] and "b" in in_order:
+        in_order.pop()
+    in_name = frozenset(in_order)
     for positive, negative in CLUES["opposite"]:
         told = {positive, negative} & in_name
         if told:

@@ -74,6 +74,21 @@ def test_names_without_a_joint_go_by_their_order_and_that_is_said(
     assert any("by its place in the log: check" in reason for reason in found.reasons)
 
 
+@pytest.mark.parametrize(
+    ("side_a", "side_b"),
+    [
+        ("I_boom_A_mA", "I_boom_B_mA"),
+        ("I_boom_A_A", "I_boom_B_A"),
+        ("boom coil A [A]", "boom coil B [A]"),
+    ],
+)
+def test_two_coils_are_one_command(side_a: str, side_b: str, tmp_path: Path) -> None:
+    """The unit of a current is no name of a side."""
+    a, b = (12 * part.clip(0) for part in (STEPS, -STEPS))
+    found = guess(tmp_path, ["t", side_b, side_a, "boom_deg"], T, b, a, SWEEP)
+    assert found.log["joints"][2]["command"]["column"] == [side_a, side_b]
+
+
 def test_a_current_loop_for_each_direction_is_its_range(tmp_path: Path) -> None:
     up, down = (4 + 0.16 * part.clip(0) for part in (STEPS, -STEPS))
     found = guess(

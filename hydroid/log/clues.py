@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,23 +58,44 @@ def kind_of(name: str, unit: Unit | None) -> str:
     in_name = {*words(name)}
     if not in_name.isdisjoint(CLUES["derived"]):
         return "other"
-    if unit:
-        return _kind_by_unit(in_name, unit)
     # also in /joint_commands.position[boom]
-    if in_name & COMMAND_WORDS:
+    if not unit and in_name & COMMAND_WORDS:
         return "command"
-    return _kind_by_words(name)
+    kind = _kind_by_unit(in_name, unit) if unit else _kind_by_words(name)
+    # a part of the whole opening is as good as a command
+    if is_of_a_valve(name) and (kind != "command" or not unit):
+        return "other"
+    if kind == "angle" and not in_name.isdisjoint(CLUES["targets"]):
+        return "target"
+    return kind
 
 
 def _kind_by_unit(in_name: Collection[str], unit: Unit) -> str:
-    """Return the kind of a column with a unit; its words say more of two
-    quantities."""
-    is_position = unit.quantity in ("angle", "length")
-    if is_position and not {*in_name}.isdisjoint(CLUES["targets"]):
-        return "target"
+    """Return the kind of a column with a unit; its words say more of what a sensor
+    gives."""
     if unit.quantity in RAW and not {*in_name}.isdisjoint(CLUES["sensors"]):
         return "angle"
     return CLUES["units"].get(unit.quantity, "other")
+
+
+def is_of_a_valve(name: str) -> bool:
+    """Return whether a name says that a position is that of a valve's spool."""
+    parts = CLUES["valve_parts"]
+    return any(
+        first in parts["of"] and second in parts["is"]
+        for first, second in pairwise(words(name))
+    )
+
+
+def command_rank(name: str) -> int:
+    """Return which of a joint's commands comes first: 0 of one that reaches the valve, 2
+    of one that a person gives, 3 of one that is rather an angle to be reached."""
+    in_name = {*words(name)}
+    if not in_name.isdisjoint(CLUES["turns"]):
+        return 3
+    at_the_valve = not in_name.isdisjoint(CLUES["at_the_valve"])
+    by_hand = not in_name.isdisjoint(CLUES["by_hand"])
+    return 1 - at_the_valve + by_hand
 
 
 def _kind_by_words(name: str) -> str:

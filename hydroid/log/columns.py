@@ -9,7 +9,15 @@ import numpy as np
 from hydroid.arrays import Array, Limits
 from hydroid.errors import LogError
 from hydroid.files import Plain
-from hydroid.log.clues import CLUES, RAW, column_unit, joint_of, kind_of, words
+from hydroid.log.clues import (
+    CLUES,
+    RAW,
+    column_unit,
+    is_of_a_valve,
+    joint_of,
+    kind_of,
+    words,
+)
 from hydroid.log.signals import CommandRange, likely_range
 from hydroid.log.table import Signal, Table
 from hydroid.settings.log import ANGLES, LENGTHS
@@ -138,7 +146,7 @@ def _kinds(units: Mapping[str, Unit | None], names: Sequence[str]) -> dict[str, 
             kinds[name] = kind
         if kind == "command":
             bare_names.append({*words(name)} - {*CLUES["kinds"]["command"]})
-    others = [name for name in units if name not in kinds]
+    others = [name for name in units if name not in kinds and not is_of_a_valve(name)]
     sensors = {*CLUES["sensors"], *CLUES["counts"]}
     for name in others:
         of_a_sensor = not sensors.isdisjoint(words(name))

@@ -17,7 +17,7 @@ from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.angle_columns import angle_entries
-from hydroid.log.clues import column_unit, kind_of
+from hydroid.log.clues import column_unit, command_rank, kind_of
 from hydroid.log.columns import Column, Entry, beside, rises, signal_columns
 from hydroid.log.command_columns import command_entries
 from hydroid.log.condition_columns import guess_conditions
@@ -212,7 +212,10 @@ def _time_column(table: Table, columns: Sequence[Column]) -> Column:
 
 
 def _of_kind(columns: Sequence[Column], kind: str) -> list[Column]:
-    """Return the columns of a kind; lengths last, for a joint whose angle is there
+    """Return the columns of a kind, those first that a joint rather has: what reaches a
+    valve before what a person asks for; lengths last, for a joint whose angle is there
     needs none."""
     alike = [column for column in columns if column.kind == kind]
+    if kind == "command":
+        return sorted(alike, key=lambda column: command_rank(column.name))
     return sorted(alike, key=lambda column: column.is_length)

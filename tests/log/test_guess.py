@@ -411,3 +411,33 @@ def test_angles_from_0_to_360_are_moved_by_a_turn(
     found = guess_columns([open_table(log)], ["stick"], ranges={1: (low, high)})
     assert found.log["joints"][1]["angle"].get("offset", 0) == offset
     assert any("a whole turn" in reason for reason in found.reasons) == bool(offset)
+
+
+@pytest.mark.parametrize(
+    ("other", "own", "kind"),
+    [
+        ("Boom_Spool_Pos", "Boom_Angle", "angle"),
+        ("Boom_Valve_Position [mm]", "Boom_Angle", "angle"),
+        ("Boom_Valve_Feedback [V]", "Boom_Angle", "angle"),
+        ("Boom_Angle_SP", "Boom_Angle_PV", "angle"),
+        ("Ausleger_Winkel_Soll", "Ausleger_Winkel_Ist", "angle"),
+        ("Boom_SP_deg", "Boom_PV_deg", "angle"),
+        ("Boom_Joystick", "Boom_Valve_Cmd", "command"),
+        ("joy_boom [%]", "pwm_boom [%]", "command"),
+        ("Boom_Angle_Cmd", "Boom_Cmd", "command"),
+        ("lever_boom", "u_boom", "command"),
+        ("Boom_Valve_Feedback", "Boom_Valve", "command"),
+    ],
+)
+def test_of_two_columns_the_joints_own_is_taken(
+    other: str, own: str, kind: str, tmp_path: Path
+) -> None:
+    """Whatever their order; and a line names the other one."""
+    rest = {"command": "boom_deg", "angle": "boom_cmd"}[kind]
+    signals = {"command": STEPS, "angle": SWEEP}
+    (other_kind,) = signals.keys() - {kind}
+    for names in ([other, own], [own, other]):
+        columns = [signals[kind], signals[kind], signals[other_kind]]
+        found = guess(tmp_path, ["t", *names, rest], T, *columns)
+        assert found.log["joints"][2][kind]["column"] == own
+        assert other in found.unused

@@ -18,6 +18,8 @@ from hydroid.units import UNITS
 
 LARGEST_RADIANS = 6.3
 """of a log's angles without a unit; larger numbers are degrees"""
+TURN = 360.0
+"""an angle by whole turns of these is the same place [deg]"""
 COUNTS = "counts"
 """in place of a unit of angles, where columns without one hold what a sensor gives"""
 
@@ -72,12 +74,48 @@ def _angle(column: Column, joint: int, usual_unit: str, arm: Joints) -> Entry:
     if slides:
         return _position(column)
     unit = column.unit
-    hint = ""
+    hints = list[str]()
     if not unit:
         unit = usual_unit if usual_unit != COUNTS else "deg"
-        hint = "its unit is stated nowhere"
+        hints.append("its unit is stated nowhere")
     settings: Plain = {"column": column.name, "unit": unit}
-    return Entry(settings, f"{column.name}: angle in {unit}", hint)
+    turns = _whole_turns(column, unit, arm.ranges.get(joint))
+    if turns:
+        settings["offset"] = _in_unit(turns * np.radians(TURN), unit)
+        hints.append(f"offset {settings['offset']:g} is a whole turn: the same place")
+    return Entry(settings, f"{column.name}: angle in {unit}", "; ".join(hints))
+
+
+def _in_unit(angle: float, unit: str) -> float:
+    """Return an angle [rad] in a unit, of few digits."""
+    return float(f"{angle / UNITS[unit].factor:.9g}")
+
+
+def _whole_turns(column: Column, unit: str, limits: Limits | None) -> int:
+    """Return by how many turns an angle is moved into the range of its joint [rad].
+
+    A sensor that counts from 0 to 360 deg is beyond the range of a joint with negative
+    angles. What fits in no way is moved if it is beyond half a turn, where a joint's
+    angles are rarely said to be.
+    """
+    if limits is None:
+        return 0
+    # of the first log alone: another one may pass 0
+    angles = column.values * UNITS[unit].factor
+    ends = float(np.nanmin(angles)), float(np.nanmax(angles))
+    turn = np.radians(TURN)
+    turns = int(np.rint((sum(limits) - sum(ends)) / 2 / turn))
+    moved = ends[0] + turns * turn, ends[1] + turns * turn
+    if _is_within(ends, limits):
+        return 0
+    is_beyond = min(map(abs, ends)) > turn / 2
+    return turns if is_beyond or _is_within(moved, limits) else 0
+
+
+def _is_within(ends: Limits, limits: Limits) -> bool:
+    """Return whether angles are in a range, but for its margin [rad]."""
+    margin = angle_margin(*limits)
+    return limits[0] - margin <= ends[0] and ends[1] <= limits[1] + margin
 
 
 def _can_only_be_counts(

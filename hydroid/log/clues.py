@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,7 +26,8 @@ LONGEST_NUMBER = 2
 def words(name: str) -> list[str]:
     """Return the words of a column's name in lower case: "valveCmd_2 [V]" gives valve,
     cmd, 2, v."""
-    found = re.findall(r"[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
+    # "mA" is one word, though it looks like two
+    found = re.findall(r"m[AV](?![A-Za-z])|[A-Z]?[a-zäöüß]+|[A-Z]+(?![a-z])|\d+", name)
     return [word.lower() for word in found]
 
 
@@ -56,23 +58,44 @@ def kind_of(name: str, unit: Unit | None) -> str:
     in_name = {*words(name)}
     if not in_name.isdisjoint(CLUES["derived"]):
         return "other"
-    if unit:
-        return _kind_by_unit(in_name, unit)
     # also in /joint_commands.position[boom]
-    if in_name & COMMAND_WORDS:
+    if not unit and in_name & COMMAND_WORDS:
         return "command"
-    return _kind_by_words(name)
+    kind = _kind_by_unit(in_name, unit) if unit else _kind_by_words(name)
+    # a part of the whole opening is as good as a command
+    if is_of_a_valve(name) and (kind != "command" or not unit):
+        return "other"
+    if kind == "angle" and not in_name.isdisjoint(CLUES["targets"]):
+        return "target"
+    return kind
 
 
 def _kind_by_unit(in_name: Collection[str], unit: Unit) -> str:
-    """Return the kind of a column with a unit; its words say more of two
-    quantities."""
-    is_position = unit.quantity in ("angle", "length")
-    if is_position and not {*in_name}.isdisjoint(CLUES["targets"]):
-        return "target"
+    """Return the kind of a column with a unit; its words say more of what a sensor
+    gives."""
     if unit.quantity in RAW and not {*in_name}.isdisjoint(CLUES["sensors"]):
         return "angle"
     return CLUES["units"].get(unit.quantity, "other")
+
+
+def is_of_a_valve(name: str) -> bool:
+    """Return whether a name says that a position is that of a valve's spool."""
+    parts = CLUES["valve_parts"]
+    return any(
+        first in parts["of"] and second in parts["is"]
+        for first, second in pairwise(words(name))
+    )
+
+
+def command_rank(name: str) -> int:
+    """Return which of a joint's commands comes first: 0 of one that reaches the valve, 2
+    of one that a person gives, 3 of one that is rather an angle to be reached."""
+    in_name = {*words(name)}
+    if not in_name.isdisjoint(CLUES["turns"]):
+        return 3
+    at_the_valve = not in_name.isdisjoint(CLUES["at_the_valve"])
+    by_hand = not in_name.isdisjoint(CLUES["by_hand"])
+    return 1 - at_the_valve + by_hand
 
 
 def _kind_by_words(name: str) -> str:
@@ -84,6 +107,15 @@ def _kind_by_words(name: str) -> str:
     # "boom_up" is what a valve is told
     sign, _ = direction(name)
     return "command" if sign else "other"
+
+
+def is_counter(name: str, unit: Unit | None) -> bool:
+    """Return whether a column counts samples or cycles, by its name: its unit, and its
+    words, say nothing of a time."""
+    in_name = {*words(name)}
+    if unit or not in_name.isdisjoint(CLUES["kinds"]["time"]):
+        return False
+    return not in_name.isdisjoint(CLUES["counters"])
 
 
 def distinctive_part(name: str) -> str:
@@ -174,7 +206,11 @@ def number_in(name: str) -> int | None:
 
 def direction(name: str) -> tuple[int, frozenset[str]]:
     """Return +1, −1 or 0 for the direction that a name tells, and its other words."""
-    in_name = frozenset(words(name))
+    in_order = words(name)
+    # "coil_B [A]" is the current of side B
+    if in_order[-1:] == ["a"] and "b" in in_order:
+        in_order.pop()
+    in_name = frozenset(in_order)
     for positive, negative in CLUES["opposite"]:
         told = {positive, negative} & in_name
         if told:

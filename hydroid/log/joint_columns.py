@@ -1,6 +1,6 @@
 """Which column belongs to which joint: by its name or its number, or else in order."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from hydroid.arrays import Limits, record
@@ -195,7 +195,23 @@ def _left_out(
         if joint not in assigned:
             free.append(name)
     whose = "every joint has one already"
-    if free:
+    taken = [*_taken_instead(left, joints, assigned)]
+    if len(taken) == len(left):
+        whose = listed(taken, 12)
+    elif free:
         whose = f"whose {kind} is it: {' or '.join(free)}?"
     spare = listed(names, 12)
     return f"left out, though like a joint's {kind}: {spare}; {whose}"
+
+
+def _taken_instead(
+    left: Sequence[Sequence[Column]],
+    joints: Joints,
+    assigned: Mapping[int, Assignment],
+) -> Iterator[str]:
+    """Yield which column a joint has whose name one that is left out holds, too."""
+    for group in left:
+        joint = joints.named_in(group[0].name)
+        if joint in assigned:
+            columns = [column.name for column in assigned[joint].columns]
+            yield f"{joints.names[joint - 1]} has {' and '.join(columns)}"

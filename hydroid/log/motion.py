@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from hydroid.arrays import Array, Limits, record
-from hydroid.log.log import Log
+from hydroid.log.log import LEAST_COMMAND, Log
 
 QUICK = 0.05
 """standard deviation of the Gaussian behind which speeds are read [s]"""
@@ -221,7 +221,7 @@ class JointMotion:
         Only what is as quick as a valve moves it: an arm that leaks sinks slowly.
         """
         period = self.log.period
-        given = np.flatnonzero(self._logged)
+        given = np.flatnonzero(np.abs(self._logged) >= LEAST_COMMAND)
         if not len(given):
             return 0.0, 0.0
         samples = np.arange(len(self._logged))

@@ -7,7 +7,7 @@ import numpy as np
 
 from hydroid.arrays import Array, record
 from hydroid.log.likely_units import larger_unit
-from hydroid.log.log import Log, LogFinding, log_finding
+from hydroid.log.log import LEAST_COMMAND, Log, LogFinding, log_finding
 from hydroid.log.mapping import angle_margin
 from hydroid.log.motion import END, LEAST_PATH, JointMotion, driven_joints, motion_of
 from hydroid.log.signals import CommandRange, likely_range
@@ -189,8 +189,10 @@ def _not_told(joint: _Joint) -> Iterator[LogFinding]:
     upwards, downwards = motion.unasked
     unasked = max(upwards, downwards)
     if unasked > max(LEAST_PATH, UNASKED * motion.travel):
+        # a coil at rest shows noise
         command = motion.log.command_of(motion.joint)
-        one_way = (command >= 0).all() or (command <= 0).all()
+        given = command[np.abs(command) >= LEAST_COMMAND]
+        one_way = (given > 0).all() or (given < 0).all()
         kind = "half a command" if one_way else "unasked"
         path = "positive" if upwards > downwards else "negative"
         by = joint.angle.shown.way(unasked)

@@ -74,6 +74,21 @@ def test_names_without_a_joint_go_by_their_order_and_that_is_said(
     assert any("by its place in the log: check" in reason for reason in found.reasons)
 
 
+@pytest.mark.parametrize(
+    ("side_a", "side_b"),
+    [
+        ("I_boom_A_mA", "I_boom_B_mA"),
+        ("I_boom_A_A", "I_boom_B_A"),
+        ("boom coil A [A]", "boom coil B [A]"),
+    ],
+)
+def test_two_coils_are_one_command(side_a: str, side_b: str, tmp_path: Path) -> None:
+    """The unit of a current is no name of a side."""
+    a, b = (12 * part.clip(0) for part in (STEPS, -STEPS))
+    found = guess(tmp_path, ["t", side_b, side_a, "boom_deg"], T, b, a, SWEEP)
+    assert found.log["joints"][2]["command"]["column"] == [side_a, side_b]
+
+
 def test_a_current_loop_for_each_direction_is_its_range(tmp_path: Path) -> None:
     up, down = (4 + 0.16 * part.clip(0) for part in (STEPS, -STEPS))
     found = guess(
@@ -370,3 +385,69 @@ def test_two_arms_keep_their_columns_apart(tmp_path: Path) -> None:
         assert boom["angle"]["column"] == f"{side}_boom_deg"
         assert 2 not in found.log["joints"]
         assert {f"{other}_boom_cmd", f"{other}_boom_deg"} <= {*found.unused}
+
+
+@pytest.mark.parametrize(
+    ("shift", "limits", "offset"),
+    [
+        (360, (-130, -20), -360),
+        (360, (-10, 20), -360),
+        (0, (-130, -20), 0),
+        (360, (180, 340), 0),
+    ],
+    ids=["in its range", "in no range", "negative", "a range beyond half a turn"],
+)
+def test_angles_from_0_to_360_are_moved_by_a_turn(
+    shift: float, limits: tuple[float, float], offset: float, tmp_path: Path
+) -> None:
+    """Angles of -80 to -40 deg, as a sensor counts them that has no negative ones."""
+    log = tmp_path / "log.csv"
+    angle = SWEEP - 60 + shift
+    header = "t,stick_cmd,stick_deg"
+    np.savetxt(
+        log, np.stack([T, STEPS, angle], 1), delimiter=",", header=header, comments=""
+    )
+    low, high = np.radians(limits).tolist()
+    found = guess_columns([open_table(log)], ["stick"], ranges={1: (low, high)})
+    assert found.log["joints"][1]["angle"].get("offset", 0) == offset
+    assert any("a whole turn" in reason for reason in found.reasons) == bool(offset)
+
+
+@pytest.mark.parametrize(
+    ("other", "own", "kind"),
+    [
+        ("Boom_Spool_Pos", "Boom_Angle", "angle"),
+        ("Boom_Valve_Position [mm]", "Boom_Angle", "angle"),
+        ("Boom_Valve_Feedback [V]", "Boom_Angle", "angle"),
+        ("Boom_Angle_SP", "Boom_Angle_PV", "angle"),
+        ("Ausleger_Winkel_Soll", "Ausleger_Winkel_Ist", "angle"),
+        ("Boom_SP_deg", "Boom_PV_deg", "angle"),
+        ("Boom_Joystick", "Boom_Valve_Cmd", "command"),
+        ("joy_boom [%]", "pwm_boom [%]", "command"),
+        ("Boom_Angle_Cmd", "Boom_Cmd", "command"),
+        ("lever_boom", "u_boom", "command"),
+        ("Boom_Valve_Feedback", "Boom_Valve", "command"),
+    ],
+)
+def test_of_two_columns_the_joints_own_is_taken(
+    other: str, own: str, kind: str, tmp_path: Path
+) -> None:
+    """Whatever their order; and a line names the other one."""
+    rest = {"command": "boom_deg", "angle": "boom_cmd"}[kind]
+    signals = {"command": STEPS, "angle": SWEEP}
+    (other_kind,) = signals.keys() - {kind}
+    for names in ([other, own], [own, other]):
+        columns = [signals[kind], signals[kind], signals[other_kind]]
+        found = guess(tmp_path, ["t", *names, rest], T, *columns)
+        assert found.log["joints"][2][kind]["column"] == own
+        assert other in found.unused
+
+
+@pytest.mark.parametrize("name", ["cycle", "PLC_Tick", "counter"])
+def test_a_counter_is_no_time_by_its_values(name: str, tmp_path: Path) -> None:
+    """Counts of 10 ms, every fifth of them logged, look like times in ms."""
+    counts = 5.0 * np.arange(len(T))
+    with pytest.raises(LogError, match=f"{name} counts.*such as {name}_ms"):
+        guess(tmp_path, [name, "boom_cmd", "boom_deg"], counts, STEPS, SWEEP)
+    named = [f"{name}_ms", "boom_cmd", "boom_deg"]
+    assert guess(tmp_path, named, counts, STEPS, SWEEP).log["time"]["unit"] == "ms"

@@ -7,6 +7,8 @@ import pytest
 from made_logs import noisy, step_log
 
 from hydroid.log import JointMotion, Log
+from hydroid.log.motion_checks import check_motion
+from hydroid.log.table import Signal
 
 PERIOD = 0.02
 
@@ -47,6 +49,19 @@ def test_a_joint_that_rests_most_of_the_time_is_as_fast():
     assert resting.speed == pytest.approx(JointMotion(moving, 1).speed, rel=0.2)
     # the noise is no motion that nobody has asked for
     assert sum(resting.unasked) < 1.0
+
+
+def test_the_noise_of_a_coil_is_no_command_that_asks_for_a_motion():
+    full = joint_log()
+    noise = 0.3 * np.random.default_rng(1).random(full.command.shape)
+    # the coil of the other direction is not logged
+    half = replace(full, command=full.command.clip(0) + noise)
+    signals = [
+        Signal("u_boom_a", "command", joint=1),
+        Signal("q", "angle", joint=1, unit="deg"),
+    ]
+    kinds = [one.kind for one in check_motion(half, signals, [1], [], 0.0)]
+    assert "half a command" in kinds
 
 
 def test_half_a_second_of_slow_motion_makes_no_dead_band():

@@ -41,6 +41,11 @@ def test_a_log_is_read_rightly_or_its_fault_is_said(
     assert found.verdict == ("said" if log.said else "right"), found.line
 
 
+def scaled(columns: Columns, word: str, scale: float) -> Columns:
+    """Return columns, those with a word in their names in another unit."""
+    return {k: scale * v if word in k else v for k, v in columns.items()}
+
+
 @pytest.mark.parametrize(
     ("place", "change"),
     [
@@ -52,8 +57,14 @@ def test_a_log_is_read_rightly_or_its_fault_is_said(
                 columns | {"boom_cmd_pct": 1500 + 5 * columns["boom_cmd_pct"]}
             ),
         ),
+        (2, lambda columns: scaled(columns, "cmd", 0.01)),
     ],
-    ids=["a joint is missing", "ms", "pulses in the log to validate on"],
+    ids=[
+        "a joint is missing",
+        "ms",
+        "pulses in the log to validate on",
+        "commands in +-1",
+    ],
 )
 def test_a_log_that_differs_from_the_first_is_left_out_of_the_commands(
     place: int, change: Callable[[Columns], Columns], tmp_path: Path
@@ -68,6 +79,20 @@ def test_a_log_that_differs_from_the_first_is_left_out_of_the_commands(
     assert made.commands
     for command in made.commands:
         assert str(logs[place]) not in command
+
+
+def test_angles_in_rad_beside_others_in_deg_widen_no_range(tmp_path: Path) -> None:
+    """The arm of boxes has the ranges that logs reach."""
+    columns = table(make_truth((70, -60, 100)))
+    logs = [tmp_path / name for name in ("deg.csv", "rad.csv")]
+    logs[0].write_text(text(columns))
+    logs[1].write_text(text(scaled(columns, "angle", np.pi / 180)))
+    sizes = {"joints": [*JOINTS], "lengths": ["2", "2"]}
+    made = hydroid.init(tmp_path / "mine", log=logs, **sizes).result
+    (reason,) = [one for one in made.columns if "left out of the commands" in one]
+    assert str(logs[1]) in reason
+    assert "rad" in reason
+    assert all(str(logs[1]) not in command for command in made.commands)
 
 
 @pytest.mark.parametrize("label", ["counts", "wire_V"])

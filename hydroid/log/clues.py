@@ -109,6 +109,15 @@ def _kind_by_words(name: str) -> str:
     return "command" if sign else "other"
 
 
+def is_counter(name: str, unit: Unit | None) -> bool:
+    """Return whether a column counts samples or cycles, by its name: its unit, and its
+    words, say nothing of a time."""
+    in_name = {*words(name)}
+    if unit or not in_name.isdisjoint(CLUES["kinds"]["time"]):
+        return False
+    return not in_name.isdisjoint(CLUES["counters"])
+
+
 def distinctive_part(name: str) -> str:
     """Return what a column has for itself: of `/CalibratedJointVals3.position[Boom]`
     Boom, else its name.

@@ -13,6 +13,7 @@ from hydroid.log.clues import (
     CLUES,
     RAW,
     column_unit,
+    is_counter,
     is_of_a_valve,
     joint_of,
     kind_of,
@@ -158,7 +159,7 @@ def _kinds(units: Mapping[str, Unit | None], names: Sequence[str]) -> dict[str, 
 
 def _time_by_values(table: Table, known: Collection[str]) -> Iterator[Column]:
     """Yield the first column of dates, or else of numbers that rise in even steps, as a
-    time; a counter of samples is none.
+    time; a counter of samples or cycles is none.
 
     `known`: columns that are something else.
     """
@@ -169,6 +170,8 @@ def _time_by_values(table: Table, known: Collection[str]) -> Iterator[Column]:
         values = table.read([Signal(name, "time")]).time
         steps = np.diff(values[np.isfinite(values)])
         if not rises(values):
+            continue
+        if is_counter(name, column_unit(name, table.units.get(name, ""))):
             continue
         is_date = cells.dtype.kind == "M" or values[0] > EXCEL_DAYS
         unit = likely_time_unit(float(np.median(steps)))

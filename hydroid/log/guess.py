@@ -8,7 +8,7 @@ given to the joints in order; beside columns that have one, a column without is 
 and named.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,13 +17,13 @@ from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.angle_columns import angle_entries
-from hydroid.log.clues import column_unit, command_rank, kind_of
+from hydroid.log.clues import column_unit, command_rank, is_counter, kind_of
 from hydroid.log.columns import Column, Entry, beside, rises, signal_columns
 from hydroid.log.command_columns import command_entries
 from hydroid.log.condition_columns import guess_conditions
 from hydroid.log.joint_columns import Assignment, Joints, by_joint
 from hydroid.log.rods import Rod
-from hydroid.log.table import Table
+from hydroid.log.table import Signal, Table
 from hydroid.units import UNITS, likely_time_unit
 from hydroid.words import listed
 
@@ -206,9 +206,24 @@ def _time_column(table: Table, columns: Sequence[Column]) -> Column:
     """
     times = [column for column in columns if column.kind == "time"]
     if not times:
-        hint = f"it has {listed([*filter(None, table.names)], 6)}"
+        hint = "; ".join(counter_reasons(table))
+        hint = hint or f"it has {listed([*filter(None, table.names)], 6)}"
         raise LogError("has no column that looks like a time", table.source, hint)
     return max(times, key=lambda column: rises(column.values))
+
+
+def counter_reasons(table: Table) -> Iterator[str]:
+    """Yield why columns that count samples or cycles are no times."""
+    for name in table.names:
+        unit = column_unit(name, table.units.get(name, ""))
+        if name not in table.columns or not is_counter(name, unit):
+            continue
+        # an encoder's counts do not only rise
+        if rises(table.read([Signal(name, "time")]).time):
+            yield (
+                f"{name} counts, and nothing tells the time of a count: log a time, or add its unit "
+                f"to the name, such as {name}_ms where a count is 1 ms"
+            )
 
 
 def _of_kind(columns: Sequence[Column], kind: str) -> list[Column]:

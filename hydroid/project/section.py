@@ -7,7 +7,7 @@ from hydroid.errors import LogError, SettingsError
 from hydroid.files import Plain
 from hydroid.log import ColumnGuess, Table, guess_columns
 from hydroid.log.clues import LONGEST_NUMBER
-from hydroid.log.guess import nearest_period, usual_step
+from hydroid.log.guess import counter_reasons, nearest_period, usual_step
 from hydroid.log.rods import Rod, rods_of
 from hydroid.log.table import Signal
 from hydroid.project.columns import holds_numbers
@@ -57,7 +57,7 @@ def guessed_section(
     except LogError:
         if not holds_numbers(tables[0]):
             raise
-        return ColumnGuess({"joints": {}}, (), ())
+        return ColumnGuess({"joints": {}}, tuple(counter_reasons(tables[0])), ())
     section = guess.log
     section["period_s"] = _period(section["period_s"])
     section["joints"] = _by_place(section["joints"], places)

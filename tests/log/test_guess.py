@@ -441,3 +441,13 @@ def test_of_two_columns_the_joints_own_is_taken(
         found = guess(tmp_path, ["t", *names, rest], T, *columns)
         assert found.log["joints"][2][kind]["column"] == own
         assert other in found.unused
+
+
+@pytest.mark.parametrize("name", ["cycle", "PLC_Tick", "counter"])
+def test_a_counter_is_no_time_by_its_values(name: str, tmp_path: Path) -> None:
+    """Counts of 10 ms, every fifth of them logged, look like times in ms."""
+    counts = 5.0 * np.arange(len(T))
+    with pytest.raises(LogError, match=f"{name} counts.*such as {name}_ms"):
+        guess(tmp_path, [name, "boom_cmd", "boom_deg"], counts, STEPS, SWEEP)
+    named = [f"{name}_ms", "boom_cmd", "boom_deg"]
+    assert guess(tmp_path, named, counts, STEPS, SWEEP).log["time"]["unit"] == "ms"

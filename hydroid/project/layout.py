@@ -60,6 +60,9 @@ LACKING = {
     (False, False): "no command and no angle found for {}: not fitted",
 }
 """by whether a joint has a command and an angle"""
+SIGNALS = ("signal", "channel", "variable", "tag", "signalname", "name", "kanal")
+VALUES = ("value", "val", "wert", "valeur")
+"""names of columns in logs that hold one signal per row"""
 
 MOVED = 0.5  # travel from which a joint moves [deg]
 FOLLOWS = 0.7  # correlation of a joint's speed with the command that moves it, at least
@@ -140,6 +143,7 @@ def find_layout(
     guess = guessed_section([table, *others.tables(progress)], arm, order)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
+        missing = _one_signal_per_row(table) or missing
         return _skeleton(table, arm, guess, missing)
     layout = _seen(table, arm, guess, others, GUESSED, progress)
     _set_period(layout, table)
@@ -411,6 +415,20 @@ def _has_targets(table: Table) -> bool:
         if name
     }
     return any(kind_of(name, unit) == "target" for name, unit in units.items())
+
+
+def _one_signal_per_row(table: Table) -> str:
+    """Say that the rows of a table hold a signal's name and its value; "": its columns
+    are not called so."""
+    by_name = {name.strip().lower(): name for name in table.names}
+    for called in SIGNALS:
+        for value in VALUES:
+            if called in by_name and value in by_name:
+                pair = f"{by_name[called]} and {by_name[value]}"
+                return (
+                    f"a row holds one signal ({pair}), and each signal needs a column"
+                )
+    return ""
 
 
 def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:

@@ -97,6 +97,16 @@ def test_a_joint_that_follows_anothers_command_is_named(
     assert [one.split(" follows")[0] for one in said] == [*JOINTS] * exchanged
 
 
+def test_a_log_of_one_signal_per_row_is_said_to_need_columns(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    rows = ("0.00,BoomCmd,0.0", "0.01,BoomAngle,24.9", "0.02,BoomCmd,10.0")
+    log.write_text("\n".join(["Timestamp,Signal,Value", *rows, ""]))
+    made = hydroid.init(tmp_path / "mine", log=log).result
+    assert made.missing == (
+        "a row holds one signal (Signal and Value), and each signal needs a column"
+    )
+
+
 def test_angles_in_rad_beside_others_in_deg_widen_no_range(tmp_path: Path) -> None:
     """The arm of boxes has the ranges that logs reach."""
     columns = table(make_truth((70, -60, 100)))

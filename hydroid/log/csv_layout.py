@@ -7,6 +7,7 @@ holds no number: any other fault there is a fault of the data.
 """
 
 import csv
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -18,6 +19,7 @@ from hydroid.log.table import clock, number
 from hydroid.units import bare, unit_of
 from hydroid.words import listed
 
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 SEPARATORS = "\t;,| "
 # a longer cell is no number, which is said, with its place
 csv.field_size_limit(2**31 - 1)
@@ -38,6 +40,8 @@ class CsvLayout:
         text_lines: lines of text below the names, which hold no data.
         units: that a line below the names gives to columns, by name.
         remarks: what is left out, and what is unusual.
+        quoted_commas: whether commas within quotes are decimal ones, where others part
+            the cells.
     """
 
     separator: str
@@ -47,10 +51,13 @@ class CsvLayout:
     text_lines: Sequence[int]
     units: Mapping[str, str]
     remarks: Sequence[str]
+    quoted_commas: bool = False
 
     def has_decimal_commas(self, line: str) -> bool:
         """Return whether a line holds commas that part no cells."""
-        return self.separator != "," and "," in line
+        if self.separator == ",":
+            return self.quoted_commas and '"' in line
+        return "," in line
 
     def cells(self, line: str) -> list[str]:
         """Return as many cells of a line as there are names.
@@ -61,6 +68,8 @@ class CsvLayout:
         if self.separator != "," and "," in line:
             line = line.replace(",", ".")
         cells = split(line, self.separator)
+        if self.quoted_commas:
+            cells = [cell.replace(",", ".") for cell in cells]
         count = len(self.names)
         if len(cells) == self.width < count:
             return cells + [""] * (count - self.width)
@@ -106,7 +115,18 @@ def find_csv_layout(sample: Mapping[int, str], path: Path) -> CsvLayout:
         text_lines=text_lines,
         units=units,
         remarks=remarks,
+        quoted_commas=separator == "," and _have_quoted_commas(data),
     )
+
+
+def _have_quoted_commas(rows: Sequence[Sequence[str]]) -> bool:
+    """Return whether commas in cells, which quotes keep together, are decimal ones: no
+    number has a point, and not all of them can be those of thousands."""
+    numbers = [cell for row in rows for cell in row if _decimal(cell) is not None]
+    with_comma = [cell for cell in numbers if "," in cell]
+    if not with_comma or any("." in cell for cell in numbers):
+        return False
+    return not all(map(_THOUSANDS.fullmatch, with_comma))
 
 
 def split(line: str, separator: str) -> list[str]:

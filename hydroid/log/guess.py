@@ -17,7 +17,14 @@ from hydroid.arrays import Array
 from hydroid.errors import LogError
 from hydroid.files import Plain
 from hydroid.log.angle_columns import angle_entries
-from hydroid.log.clues import column_unit, command_rank, is_counter, kind_of
+from hydroid.log.clues import (
+    CLUES,
+    column_unit,
+    command_rank,
+    is_counter,
+    kind_of,
+    words,
+)
 from hydroid.log.columns import Column, Entry, beside, rises, signal_columns
 from hydroid.log.command_columns import command_entries
 from hydroid.log.condition_columns import guess_conditions
@@ -90,6 +97,7 @@ def guess_columns(
     conditions = _condition_settings(tables, (*joints, *links), used, reasons)
     taken = [settings["column"] for settings in conditions.values()]
     unused = tuple(name for name in unused if name not in taken)
+    reasons += _direction_reasons(table, unused)
     if unused:
         reasons.append(f"not used: {listed(unused)}")
     log: Plain = {
@@ -107,6 +115,19 @@ def _target_reasons(columns: Sequence[Column]) -> list[str]:
     """Return why columns that hold a controller's targets are not used."""
     what = "a position target of a controller, not a valve's opening"
     return [f"{column.name}: {what}" for column in columns if column.kind == "target"]
+
+
+def _direction_reasons(table: Table, unused: Sequence[str]) -> Iterator[str]:
+    """Yield which unused columns of two values may hold the direction of a command."""
+    for name in unused:
+        if {*words(name)}.isdisjoint(CLUES["direction"]) or name not in table.columns:
+            continue
+        values = _numbers(table, name)
+        if len(np.unique(values[np.isfinite(values)])) == 2:
+            yield (
+                f"{name}: like the direction of a command; no setting joins two columns so: write a "
+                "column of signed commands"
+            )
 
 
 def _condition_settings(
@@ -214,17 +235,26 @@ def _time_column(table: Table, columns: Sequence[Column]) -> Column:
     return max(times, key=lambda column: rises(column.values))
 
 
+def _numbers(table: Table, name: str) -> Array:
+    """Return the cells of a column, (R,); none where it holds no numbers."""
+    try:
+        return table.read([Signal(name, "command")]).time
+    except LogError:
+        return np.zeros(0)
+
+
 def counter_reasons(table: Table) -> Iterator[str]:
     """Yield why columns that count samples or cycles are no times."""
     for name in table.names:
         unit = column_unit(name, table.units.get(name, ""))
-        if name in table.columns and is_counter(name, unit):
-            # an encoder's counts do not only rise
-            if rises(table.read([Signal(name, "time")]).time):
-                yield (
-                    f"{name} counts, and nothing tells the time of a count: log a time, or add "
-                    f"its unit to the name, such as {name}_ms where a count is 1 ms"
-                )
+        if name not in table.columns or not is_counter(name, unit):
+            continue
+        # an encoder's counts do not only rise
+        if rises(_numbers(table, name)):
+            yield (
+                f"{name} counts, and nothing tells the time of a count: log a time, or add its unit "
+                f"to the name, such as {name}_ms where a count is 1 ms"
+            )
 
 
 def _of_kind(columns: Sequence[Column], kind: str) -> list[Column]:

@@ -252,6 +252,16 @@ class JointMotion:
         with_speed = self._following.max(initial=0.0)
         return bool(with_speed < VALVE)
 
+    def following(self, joint: int) -> float:
+        """Return the correlation of its speed with an earlier command of a joint
+        (number, from 1)."""
+        if joint == self.joint:
+            return float(self._following.max(initial=0.0))
+        _, _, speed = self._quick
+        lags = round(LONGEST_LAG / self.log.period)
+        command = self.log.command_of(joint)
+        return float(_correlations(command, speed, lags).max(initial=0.0))
+
     @property
     def _logged(self) -> Array:
         """Its command as logged [%]."""

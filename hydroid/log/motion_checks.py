@@ -24,6 +24,9 @@ FULL = 50.0
 range"""
 MOVES_WELL = 3.0
 """travel [deg] that no command of a few per cent would give"""
+BOTH_WAYS = 0.2
+"""part of its way under commands that a joint moves each way at least, above which
+commands of one sign lack their direction"""
 HARDLY_MOVES = 2.0
 """travel [deg] that is too little after commands of MUCH_PUSH"""
 MUCH_PUSH = 300.0
@@ -186,19 +189,28 @@ def _not_told(joint: _Joint) -> Iterator[LogFinding]:
     """Yield what the log does not tell of a joint's commands: one direction, or any
     valve's opening."""
     motion = joint.motion
+    # a coil at rest shows noise
+    command = motion.log.command_of(motion.joint)
+    given = command[np.abs(command) >= LEAST_COMMAND]
+    one_way = (given > 0).all() or (given < 0).all()
     upwards, downwards = motion.unasked
     unasked = max(upwards, downwards)
     if unasked > max(LEAST_PATH, UNASKED * motion.travel):
-        # a coil at rest shows noise
-        command = motion.log.command_of(motion.joint)
-        given = command[np.abs(command) >= LEAST_COMMAND]
-        one_way = (given > 0).all() or (given < 0).all()
         kind = "half a command" if one_way else "unasked"
         path = "positive" if upwards > downwards else "negative"
         by = joint.angle.shown.way(unasked)
         yield joint.warning(kind, joint.command, by=by, path=path)
+    elif one_way and _moves_both_ways(motion):
+        yield joint.warning("one sign", joint.command)
     if motion.is_target:
         yield joint.warning("target", joint.command)
+
+
+def _moves_both_ways(motion: JointMotion) -> bool:
+    """Return whether a joint moves well to either side under its strong commands."""
+    path, against = motion.directed
+    least = BOTH_WAYS * path
+    return path > motion.travel and least < against * path < path - least
 
 
 def _still(joint: _Joint) -> Iterator[LogFinding]:

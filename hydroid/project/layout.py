@@ -22,6 +22,7 @@ from hydroid.log.clues import column_unit, kind_of
 from hydroid.log.conditions import varies
 from hydroid.log.log import LEAST_COMMAND
 from hydroid.log.mapping import angle_margin
+from hydroid.log.motion import SHORTEST_LOG
 from hydroid.progress import Progress, no_progress
 from hydroid.project.columns import column_lines
 from hydroid.project.logs import Others, reach_of, read_first, read_others
@@ -59,8 +60,13 @@ LACKING = {
     (False, False): "no command and no angle found for {}: not fitted",
 }
 """by whether a joint has a command and an angle"""
+SIGNALS = ("signal", "channel", "variable", "tag", "signalname", "name", "kanal")
+VALUES = ("value", "val", "wert", "valeur")
+"""names of columns in logs that hold one signal per row"""
 
 MOVED = 0.5  # travel from which a joint moves [deg]
+FOLLOWS = 0.7  # correlation of a joint's speed with the command that moves it, at least
+NOT_FOLLOWS = 0.3  # with one that does not, at most
 FOLLOWED = 1.0  # travel above which a joint that no command drives is followed [deg]
 
 
@@ -137,6 +143,7 @@ def find_layout(
     guess = guessed_section([table, *others.tables(progress)], arm, order)
     missing = missing_column(guess.log, targets=_has_targets(table))
     if missing:
+        missing = _one_signal_per_row(table) or missing
         return _skeleton(table, arm, guess, missing)
     layout = _seen(table, arm, guess, others, GUESSED, progress)
     _set_period(layout, table)
@@ -182,6 +189,7 @@ def _seen(
         reach = reach_of([*logs, *unseen], measured)
         motions = {joint: _telling(logs, joint) for joint in measured}
         reasons += _disagreeing(logs, motions, arm)
+        reasons += _exchanged(motions, driven, arm.joint_names)
         _refuse_rest(table, driven, logs, arm.joint_names)
         driven = _driven(driven, logs, arm.joint_names, reasons)
     wrong = _turn_commands(entries, motions, reach, arm, reasons)
@@ -257,6 +265,24 @@ def _disagreeing(
             yield (
                 f"{name} turns by its command the other way in {listed(sorted({*others}))} than in "
                 f"{most}: record these logs alike"
+            )
+
+
+def _exchanged(
+    motions: Mapping[int, JointMotion], driven: Sequence[int], names: Sequence[str]
+) -> Iterator[str]:
+    """Yield which joints follow the command of another joint and not their own."""
+    for joint in driven:
+        motion = motions[joint]
+        if len(driven) < 2 or motion.log.duration < SHORTEST_LOG:
+            continue
+        others = {other: motion.following(other) for other in driven if other != joint}
+        leader = max(others, key=lambda other: others[other])
+        if others[leader] > FOLLOWS and motion.following(joint) < NOT_FOLLOWS:
+            name, other = names[joint - 1], names[leader - 1]
+            yield (
+                f"{name} follows the command of {other} and not its own: exchange the angles or the "
+                "commands of the two in log.joints of fit.yaml, and run init again with --config"
             )
 
 
@@ -393,6 +419,20 @@ def _has_targets(table: Table) -> bool:
         if name
     }
     return any(kind_of(name, unit) == "target" for name, unit in units.items())
+
+
+def _one_signal_per_row(table: Table) -> str:
+    """Say that the rows of a table hold a signal's name and its value; "": its columns
+    are not called so."""
+    by_name = {name.strip().lower(): name for name in table.names}
+    for called in SIGNALS:
+        for value in VALUES:
+            if called in by_name and value in by_name:
+                pair = f"{by_name[called]} and {by_name[value]}"
+                return (
+                    f"a row holds one signal ({pair}), and each signal needs a column"
+                )
+    return ""
 
 
 def _skeleton(table: Table, arm: Arm, guess: ColumnGuess, missing: str) -> Layout:

@@ -26,7 +26,16 @@ from hydroid.settings.log import LogSettings
 from hydroid.units import UNITS
 
 UNUSABLE = "the log cannot be used as it is"
-SAID = ("row left out", "cut end", "lost", "gap", "half a command", "unasked", "target")
+SAID = (
+    "row left out",
+    "cut end",
+    "lost",
+    "gap",
+    "half a command",
+    "unasked",
+    "one sign",
+    "target",
+)
 """kinds of findings that say which part of a log is not read, or not told by it"""
 UNLIKE = ("range", "range of one", "unit")
 """kinds of findings that say that a log is in other units than the settings say"""

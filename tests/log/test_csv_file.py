@@ -5,6 +5,7 @@ import pytest
 from log_files import assert_same, cells, lines, place, read, save
 
 from hydroid.errors import LogError
+from hydroid.log.csv import open_csv
 
 ROWS = lines(cells())
 
@@ -23,6 +24,9 @@ def with_degree_sign(data: str) -> str:
 DIALECTS: dict[str, Callable[[], bytes]] = {
     "decimal comma": lambda: text(";", ",").encode(),
     "decimal comma, tab": lambda: text("\t", ",").encode(),
+    "decimal comma, quoted": lambda: "\n".join(
+        ",".join(f'"{cell.replace(".", ",")}"' for cell in row) for row in ROWS
+    ).encode(),
     "byte order mark": lambda: text().encode("utf-8-sig"),
     "utf-16": lambda: text("\t", ",").encode("utf-16"),
     "latin-1": lambda: with_degree_sign(text()).encode("latin-1"),
@@ -178,3 +182,14 @@ def test_names_and_cells_of_different_number(tmp_path: Path) -> None:
         log, (finding,) = read(save(tmp_path / "log.csv", table))
         assert finding.what == remark
         assert_same(log, plain)
+
+
+def test_quoted_commas_of_thousands_are_no_decimal_ones(tmp_path: Path) -> None:
+    """A spreadsheet writes 1,500 so beside numbers with points."""
+    log = tmp_path / "log.csv"
+    log.write_text('t,q\n0.5,"1,500"\n1.0,"1,600"\n')
+    assert open_csv(log).remarks == ()
+    log.write_text('t,q\n"0,5","1,500"\n"1,0","1,600"\n')
+    table = open_csv(log)
+    assert table.columns["q"].tolist() == [1.5, 1.6]
+    assert table.remarks == ("commas are read as decimal points",)

@@ -451,3 +451,10 @@ def test_a_counter_is_no_time_by_its_values(name: str, tmp_path: Path) -> None:
         guess(tmp_path, [name, "boom_cmd", "boom_deg"], counts, STEPS, SWEEP)
     named = [f"{name}_ms", "boom_cmd", "boom_deg"]
     assert guess(tmp_path, named, counts, STEPS, SWEEP).log["time"]["unit"] == "ms"
+
+
+def test_a_column_of_the_commands_direction_is_named(tmp_path: Path) -> None:
+    names = ["t", "boom_pwm", "boom_dir", "boom_deg"]
+    found = guess(tmp_path, names, T, np.abs(STEPS), 1.0 * (STEPS > 0), SWEEP)
+    assert found.unused == ("boom_dir",)
+    assert any("boom_dir: like the direction" in reason for reason in found.reasons)

@@ -64,6 +64,18 @@ def test_the_noise_of_a_coil_is_no_command_that_asks_for_a_motion():
     assert "half a command" in kinds
 
 
+def test_a_command_without_its_direction_is_said():
+    full = joint_log(lag=0.1)
+    signals = [
+        Signal("pwm", "command", joint=1),
+        Signal("q", "angle", joint=1, unit="deg"),
+    ]
+    for command, said in ((np.abs(full.command), True), (full.command, False)):
+        log = replace(full, command=command)
+        kinds = [one.kind for one in check_motion(log, signals, [1], [], 0.0)]
+        assert ("one sign" in kinds) == said
+
+
 def test_half_a_second_of_slow_motion_makes_no_dead_band():
     """Nothing is commanded between rest and 30 %, and the joint barely has time to
     start there."""

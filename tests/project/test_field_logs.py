@@ -81,6 +81,32 @@ def test_a_log_that_differs_from_the_first_is_left_out_of_the_commands(
         assert str(logs[place]) not in command
 
 
+@pytest.mark.parametrize("exchanged", [True, False])
+def test_a_joint_that_follows_anothers_command_is_named(
+    exchanged: bool, tmp_path: Path
+) -> None:
+    columns = table(make_truth((70, -60, 100)))
+    boom, stick = (name for name in columns if "angle" in name)
+    if exchanged:
+        columns |= {boom: columns[stick], stick: columns[boom]}
+    log = tmp_path / "log.csv"
+    log.write_text(text(columns))
+    sizes = {"joints": [*JOINTS], "lengths": ["2", "2"]}
+    made = hydroid.init(tmp_path / "mine", log=log, **sizes).result
+    said = [one for one in made.columns if "and not its own" in one]
+    assert [one.split(" follows")[0] for one in said] == [*JOINTS] * exchanged
+
+
+def test_a_log_of_one_signal_per_row_is_said_to_need_columns(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    rows = ("0.00,BoomCmd,0.0", "0.01,BoomAngle,24.9", "0.02,BoomCmd,10.0")
+    log.write_text("\n".join(["Timestamp,Signal,Value", *rows, ""]))
+    made = hydroid.init(tmp_path / "mine", log=log).result
+    assert made.missing == (
+        "a row holds one signal (Signal and Value), and each signal needs a column"
+    )
+
+
 def test_angles_in_rad_beside_others_in_deg_widen_no_range(tmp_path: Path) -> None:
     """The arm of boxes has the ranges that logs reach."""
     columns = table(make_truth((70, -60, 100)))

@@ -99,9 +99,10 @@ def _held(problem: Problem) -> Iterator[Term]:
             continue
         # without bounds from a quarter to four times the value
         around = (fixed / 4.0, 4.0 * fixed)
-        low, high = parameter.bounds or CHOICES[parameter.quantity].span or around
+        quantity = CHOICES[parameter.quantity]
+        low, high = parameter.bounds or quantity.span or around
         low = min(low, fixed)
-        high = max(high, fixed)
+        high = min(max(high, fixed), quantity.highest)
         if low < high:
             freed = parameter.changed({"fixed": None, "bounds": (low, high)})
             yield Term(name, {name: freed}, fixed)

@@ -141,19 +141,19 @@ def test_a_missing_delay_is_found_and_lowers_the_error_on_parts_left_out(
 
 
 @pytest.mark.parametrize(
-    ("span", "held", "value", "bounds"),
+    ("quantity", "span", "held", "value", "bounds"),
     [
-        ((0.0, 1.0), 0.0, 0.02, [0.0, 0.1]),
-        ((-0.5, 0.5), 0.0, -0.296, [-0.5, 0.0]),
-        ((-0.5, 0.5), 0.0, 0.05, [0.0, 0.25]),
-        ((1.0, 100.0), np.inf, 40.0, [8.0, 100.0]),
-        ((0.1, 10.0), 1.0, 0.4, [0.1, 2.0]),
+        ("delay", (0.0, 1.0), 0.0, 0.02, [0.0, 0.1]),
+        ("lever_bend", (-0.5, 0.5), 0.0, -0.296, [-0.5, 0.0]),
+        ("lever_bend", (-0.5, 0.5), 0.0, 0.05, [0.0, 0.25]),
+        ("flow_limit", (1.0, 100.0), np.inf, 40.0, [8.0, 100.0]),
+        ("opening_exponent", (0.1, 10.0), 1.0, 0.4, [0.1, 2.0]),
     ],
 )
 def test_a_proposed_term_begins_at_what_was_found_within_its_bounds(
-    span, held, value, bounds
+    quantity, span, held, value, bounds
 ):
-    entry = ParameterSettings(quantity="lever_bend", joints=(2,), bounds=span)
+    entry = ParameterSettings(quantity=quantity, joints=(2,), bounds=span)
     term = Term("bend", {"bend": entry}, held)
     row = proposed(Candidate(term, value, 5.0, 0.0, 9.0), value)["bend"]
     assert row["bounds"] == bounds

@@ -147,7 +147,10 @@ def _lines(project: "Project", *, guessed: bool) -> list[str]:
                 "The log's columns, guessed. Check them, and correct them in fit.yaml:"
             )
         picture = project.folder / "arm.png"
-        mend = "mend the log, as it says above, and " if project.unusable else ""
+        mend = ""
+        if project.unusable:
+            # no range, start or sign is known of a log that cannot be read
+            mend = "mend the log, as it says above, repeat init with --force, and "
         look = (
             f"Next: {mend}look at {picture}, then (--budget 5min stops a fit at its best model "
             "after 5 min on the clock; --resume gives it 5 more):"

@@ -534,6 +534,7 @@ def test_a_log_that_must_be_mended_first_is_no_success(place: Path, tmp_path: Pa
     assert "the log cannot be used as it is" in done.output
     assert "time does not increase" in done.output
     assert "Next: mend the log" in done.output
+    assert "repeat init with --force" in done.output
 
 
 def test_an_error_names_no_file_that_is_gone(tmp_path: Path):

@@ -75,11 +75,7 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
     steps = np.diff(time)
     falls = 1 + np.flatnonzero(steps <= 0)
     if len(falls):
-        before, after = time[falls[0] - 1 : falls[0] + 1]
-        # a line out of order falls by a few periods
-        is_new_clock = len(falls) == 1 and before - after > MISPLACED
-        kind = "time begins again" if is_new_clock else "time order"
-        yield recording.finding("error", kind, falls, signal, time=after, before=before)
+        yield _out_of_order(recording, falls)
         return
     duration = 0.0
     if len(times):
@@ -115,6 +111,16 @@ def _time(recording: Recording, settings: LogSettings) -> Iterator[LogFinding]:
         yield recording.finding(
             "note", kind, (), signal, step=step, period=settings.period_s
         )
+
+
+def _out_of_order(recording: Recording, falls: Ints) -> LogFinding:
+    """Return that the time falls, or stands, at some rows."""
+    before, after = recording.time[falls[0] - 1 : falls[0] + 1]
+    # a line out of order falls by a few periods
+    is_new_clock = len(falls) == 1 and before - after > MISPLACED
+    kind = "time begins again" if is_new_clock else "time order"
+    signal = recording.signals[0]
+    return recording.finding("error", kind, falls, signal, time=after, before=before)
 
 
 def _time_remedy(

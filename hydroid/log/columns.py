@@ -148,13 +148,19 @@ def _kinds(units: Mapping[str, Unit | None], names: Sequence[str]) -> dict[str, 
         if kind == "command":
             bare_names.append({*words(name)} - {*CLUES["kinds"]["command"]})
     others = [name for name in units if name not in kinds and not is_of_a_valve(name)]
-    sensors = {*CLUES["sensors"], *CLUES["counts"]}
     for name in others:
-        of_a_sensor = not sensors.isdisjoint(words(name))
-        names_a_joint = any(joint_of(name, [joint]) for joint in names)
-        if (of_a_sensor and names_a_joint) or {*words(name)} - {"joint"} in bare_names:
+        is_bare = {*words(name)} - {"joint"} in bare_names
+        if is_bare or _is_of_a_joints_sensor(name, names):
             kinds[name] = "angle"
     return kinds
+
+
+def _is_of_a_joints_sensor(name: str, joints: Sequence[str]) -> bool:
+    """Return whether a column's name says a sensor and a joint."""
+    sensors = {*CLUES["sensors"], *CLUES["counts"]}
+    if sensors.isdisjoint(words(name)):
+        return False
+    return any(joint_of(name, [joint]) for joint in joints)
 
 
 def _time_by_values(table: Table, known: Collection[str]) -> Iterator[Column]:
@@ -168,18 +174,24 @@ def _time_by_values(table: Table, known: Collection[str]) -> Iterator[Column]:
         if not name or name in known or cells is None or not len(cells):
             continue
         values = table.read([Signal(name, "time")]).time
-        steps = np.diff(values[np.isfinite(values)])
         if not rises(values):
             continue
         if is_counter(name, column_unit(name, table.units.get(name, ""))):
             continue
         is_date = cells.dtype.kind == "M" or values[0] > EXCEL_DAYS
-        unit = likely_time_unit(float(np.median(steps)))
-        # what takes minutes or days from one sample to the next is rather no time
-        is_number = unit in ("s", "ms", "us", "ns") and not (steps == 1).all()
-        if unit and (is_date or is_number):
+        if _has_usual_steps(values, is_date=is_date):
             yield Column(name, "time", "", values)
             return
+
+
+def _has_usual_steps(values: Array, *, is_date: bool) -> bool:
+    """Return whether the steps of numbers that rise are those of a time."""
+    steps = np.diff(values[np.isfinite(values)])
+    unit = likely_time_unit(float(np.median(steps)))
+    if is_date:
+        return bool(unit)
+    # what takes minutes or days from one sample to the next is rather no time
+    return unit in ("s", "ms", "us", "ns") and not (steps == 1).all()
 
 
 def _read_column(

@@ -1,9 +1,9 @@
 """Bytes -> lines -> table: the CSV dialects that loggers and spreadsheets write.
 
 Accepted: `,` `;` `|` tab, or spaces; decimal commas within quotes, or where the
-separator is no comma; comment lines `#`, a byte order mark, UTF-8, UTF-16 or Latin-1, any line ends, quoted
-cells, blank lines, dates and times of day; a preamble above the names, and a row of
-units below them.
+separator is no comma; comment lines `#`, a byte order mark, UTF-8, UTF-16 or Latin-1,
+any line ends, quoted cells, blank lines, dates and times of day; a preamble above the
+names, and a row of units below them.
 """
 
 from array import array

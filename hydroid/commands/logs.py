@@ -18,6 +18,7 @@ from hydroid.files import Plain, is_file
 from hydroid.findings import Level
 from hydroid.identified_model import IdentifiedModel
 from hydroid.log import (
+    OTHER_UNITS,
     Log,
     LogFinding,
     Reading,
@@ -65,6 +66,33 @@ def read_logs(
     Raises:
         LogError: the first fault that keeps a log from being used.
     """
+    read, findings = _checked(logs, settings, repair=repair, angles=angles)
+    if fitted:
+        findings = lacked_by_all(findings)
+    _tell([finding for of_file in findings for finding in of_file])
+    return read
+
+
+def read_tests(
+    logs: LogSources, settings: FitSettings, *, repair: bool
+) -> tuple[list[Log], set[Path]]:
+    """Read logs that shall test a fit, as `read_logs` does; return also the files among
+    them that seem to be in other units than the settings say.
+
+    Raises:
+        LogError: the first fault that keeps a log from being used.
+    """
+    read, findings = _checked(logs, settings, repair=repair)
+    told = [finding for of_file in findings for finding in of_file]
+    _tell(told)
+    unlike = [finding for finding in told if finding.kind in OTHER_UNITS]
+    return read, {log_file(finding.source) for finding in unlike}
+
+
+def _checked(
+    logs: LogSources, settings: FitSettings, *, repair: bool, angles: bool = True
+) -> tuple[list[Log], list[list[LogFinding]]]:
+    """Return logs, and what was found in each file."""
     read = list[Log]()
     files = list[list[LogFinding]]()
     pose = settings.arm.pose(settings.start_pose)
@@ -81,10 +109,7 @@ def read_logs(
                 raise of_file[0].error()
             files.append(of_file)
             read += [replace(part, pose=pose) for part in parts]
-    if fitted:
-        files = lacked_by_all(files)
-    _tell([finding for of_file in files for finding in of_file])
-    return read
+    return read, files
 
 
 def _posed(log: Log, pose: Array) -> Log:

@@ -1,7 +1,7 @@
 """`hydroid validate` and `hydroid report`: fits on logs that they were not fitted to;
 reports drawn anew."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,16 +18,21 @@ from hydroid.commands.inputs import (
     open_model,
 )
 from hydroid.commands.joint_units import in_joint_units
-from hydroid.commands.logs import read_logs, seen_logs
+from hydroid.commands.logs import read_tests, seen_logs
 from hydroid.files import Plain
 from hydroid.findings import Finding
 from hydroid.identified_model import IdentifiedModel, warn_of_changes
 from hydroid.log import Log
 from hydroid.log.overlap import KNOWN, overlap
 from hydroid.progress import LOGGER, NOTE
+from hydroid.settings.log import log_file
 from hydroid.words import listed, numbered
 
 OWN = "is what the fit itself simulates: that tests nothing"
+IN_OTHER_UNITS = (
+    "seems to be in other units than the logs of the fit: that tests nothing, "
+    "and the report of the fit does not show it"
+)
 OWN_ERROR = 2e-7
 """rms error of every joint [rad, m] below which a log is the fit's own simulation"""
 
@@ -79,7 +84,7 @@ def validate(
     """
     sources: list[ModelSource] = as_list(fit)
     models = [open_model(source, None, set) for source in sources]
-    read = [read_logs(logs, model.settings, repair=repair) for model in models]
+    read = [read_tests(logs, model.settings, repair=repair) for model in models]
     from hydroid.advice.loads import load_finding
     from hydroid.fitting.verdict import standing_out
     from hydroid.reporting.predictions import validation_page
@@ -93,8 +98,9 @@ def validate(
 
     tested = dict[str, _Tested]()
     names = numbered(model.name for model in models)
-    for source, model, unseen, name in zip(sources, models, read, names, strict=True):
-        tested[name] = _test(source, model, unseen, tolerance)
+    for source, model, tests, name in zip(sources, models, read, names, strict=True):
+        unseen, in_other_units = tests
+        tested[name] = _test(source, model, unseen, in_other_units, tolerance)
     fits = ordered({name: test.verdict for name, test in tested.items()})
     best = tested[next(iter(fits))]
     run = run_of(best.model)
@@ -188,9 +194,11 @@ def _test(
     source: ModelSource,
     model: IdentifiedModel,
     logs: Sequence[Log],
+    in_other_units: Collection[Path],
     tolerance: float | None,
 ) -> _Tested:
-    """Test a fit on logs that were read with its settings."""
+    """Test a fit on logs that were read with its settings; files that seem to be in
+    other units count apart."""
     from hydroid.fitting.validation import predicted
     from hydroid.fitting.verdict import judge
     from hydroid.run.record import record_of
@@ -219,6 +227,9 @@ def _test(
         if _is_own(prediction):
             LOGGER.warning("warning: %s: %s", log.source, OWN)
             prediction = replace(prediction, unseen=False)
+        if log_file(log.source) in in_other_units:
+            LOGGER.warning("warning: %s: %s", log.source, IN_OTHER_UNITS)
+            prediction = replace(prediction, apart=True)
         predictions.append(prediction)
     settings = model.settings
     if tolerance is not None:
@@ -237,12 +248,13 @@ def _is_own(prediction: "Prediction") -> bool:
 
 def _keep(tested: Iterable[_Tested], *, apart: bool) -> None:
     """Store what fits make of unseen logs in their own runs, whose reports show them
-    from now on."""
+    from now on; not that of logs which seem to be in other units."""
     from hydroid.reporting.predictions import write_report
     from hydroid.run.record import keep_validation
 
     for test in tested:
-        predictions = [replace(p, apart=apart) for p in test.predictions]
+        kept = [p for p in test.predictions if not p.apart]
+        predictions = [replace(p, apart=apart) for p in kept]
         run = keep_validation(test.model, predictions)
         if run:
             write_report(run)

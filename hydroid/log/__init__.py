@@ -5,6 +5,7 @@ from hydroid.log.binary import FORMATS as FORMATS
 from hydroid.log.command_sizes import one_size as one_size, only_command as only_command
 from hydroid.log.guess import ColumnGuess as ColumnGuess, guess_columns as guess_columns
 from hydroid.log.log import (
+    OTHER_UNITS as OTHER_UNITS,
     FileRows as FileRows,
     Log as Log,
     LogFinding as LogFinding,

@@ -327,6 +327,10 @@ def _line(angles: Array) -> _Line:
     return _Line(slope, mean, noise, noise / np.sqrt(squares))
 
 
+OTHER_UNITS = ("range", "range of one", "unit")
+"""kinds of findings that say that a log is in other units than the settings say"""
+
+
 @dataclass(frozen=True)
 class LogFinding(Finding):
     """A finding of one log; its `column` is a name in the header."""

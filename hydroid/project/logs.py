@@ -11,6 +11,7 @@ import numpy as np
 from hydroid.arrays import Limits
 from hydroid.errors import LogError
 from hydroid.log import (
+    OTHER_UNITS,
     Log,
     LogFinding,
     Reading,
@@ -37,8 +38,6 @@ SAID = (
     "target",
 )
 """kinds of findings that say which part of a log is not read, or not told by it"""
-UNLIKE = ("range", "range of one", "unit")
-"""kinds of findings that say that a log is in other units than the settings say"""
 RECORD_ALIKE = "record it as the first log, or make it a project of its own"
 FASTEST = 3.0
 """times its speed in other logs that a joint may have in one"""
@@ -138,7 +137,7 @@ def _unlike(findings: Sequence[LogFinding], usual: Collection[str], first: str) 
     """Say what makes another log differ in its units from the first one, which has the
     `usual` kinds of findings; "": nothing."""
     for one in findings:
-        if one.kind in UNLIKE and one.kind not in usual:
+        if one.kind in OTHER_UNITS and one.kind not in usual:
             return f"{one.where}: {one.what}, unlike in {first}: {RECORD_ALIKE}"
     return ""
 

@@ -229,6 +229,26 @@ def test_a_log_set_apart_stays_on_the_page_and_out_of_the_verdict(
     assert counts == {1: 0, 0: 1}
 
 
+def test_a_log_in_other_units_tests_nothing_and_is_not_kept(array, hydroid_cli: Run):
+    """Commands of -1 to 1, where those of the fit are in percent."""
+    shutil.copytree(array[0] / "seed-1", "run")
+    rows = (ROOT / "examples" / "logs" / "rig_shoulder_2.csv").read_text().splitlines()
+    names = rows[0].split(",")
+    commands = [number for number, name in enumerate(names) if name.endswith("_pct")]
+    lines = [rows[0]]
+    for row in rows[1:601]:
+        cells = row.split(",")
+        for number in commands:
+            cells[number] = f"{float(cells[number]) / 100:g}"
+        lines.append(",".join(cells))
+    Path("parts.csv").write_text("\n".join(lines) + "\n")
+    done = hydroid_cli("validate", "parts.csv", "--fit=run", "--json", "--out=val")
+    assert "parts.csv: seems to be in other units" in done.err
+    assert json.loads(done.out)["verdict"][0]["unseen_logs"] == 0
+    assert load_record("run").verdict[0].unseen_logs == 0
+    assert not load_record("run").validations
+
+
 def test_a_log_that_diverges_is_named_and_judged_with_the_others(
     short: Path, array, hydroid_cli: Run, monkeypatch: pytest.MonkeyPatch
 ):

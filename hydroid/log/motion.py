@@ -6,7 +6,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from hydroid.arrays import Array, Limits, record
+from hydroid.arrays import Array, Limits, Mask, record
 from hydroid.log.log import LEAST_COMMAND, Log
 
 QUICK = 0.05
@@ -220,19 +220,38 @@ class JointMotion:
 
         Only what is as quick as a valve moves it: an arm that leaks sinks slowly.
         """
-        period = self.log.period
-        given = np.flatnonzero(np.abs(self._logged) >= LEAST_COMMAND)
-        if not len(given):
+        given = np.abs(self._logged) >= LEAST_COMMAND
+        if not given.any():
             return 0.0, 0.0
-        samples = np.arange(len(self._logged))
-        last = given[np.searchsorted(given, samples, side="right") - 1]
-        idle = (samples < given[0]) | (samples - last > UNASKED_AFTER / period)
         speed = self._slow[2]
-        moves = np.flatnonzero(idle & (np.abs(speed) > MOVING * self.speed))
-        steps = np.rad2deg(speed[moves]) * period
+        idle = self._without(given, UNASKED_AFTER)
+        moves = idle & (np.abs(speed) > MOVING * self.speed)
+        steps = np.rad2deg(speed[moves]) * self.log.period
         upwards = steps.clip(0).sum()
         downwards = -steps.clip(None, 0).sum()
         return float(upwards), float(downwards)
+
+    @cached_property
+    def sinking(self) -> tuple[float, float]:
+        """Its slow way while no joint of the machine is driven [deg], and for how long
+        that is [s]."""
+        given = (np.abs(self.log.command) >= LEAST_COMMAND).any(axis=1)
+        idle = self._without(given, UNASKED_AFTER)
+        # the speed is smoothed over a part of the next motion, too
+        idle &= self._without(given[::-1], 4 * SLOW)[::-1]
+        speed = self._slow[2]
+        slow = idle & (np.abs(speed) <= MOVING * self.speed)
+        way = np.rad2deg(speed[slow].sum()) * self.log.period
+        return float(way), float(slow.sum() * self.log.period)
+
+    def _without(self, given: Mask, seconds: float) -> Mask:
+        """Return which samples have none of those `given` so many seconds before them,
+        (T,)."""
+        places = np.flatnonzero(given)
+        samples = np.arange(len(given))
+        earlier = np.searchsorted(places, samples, side="right")
+        last = np.append(places, -np.inf)[earlier - 1]
+        return samples - last > seconds / self.log.period
 
     @cached_property
     def is_target(self) -> bool:

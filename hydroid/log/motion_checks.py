@@ -33,6 +33,10 @@ MUCH_PUSH = 300.0
 """time integral of strong commands [% s]"""
 LEAST_REST = 0.2
 """before the first command [s], so that the log begins at rest"""
+LEAST_SINKING = 1.0
+"""slow way without a command [deg] that is no error of a sensor"""
+SLOWEST_SINKING = 0.05
+"""slow speed without a command [deg/s] that is no drift of a sensor"""
 LEAST_STAND = 1.0
 """how long a joint must stand though it is driven [s]"""
 
@@ -91,6 +95,7 @@ def check_motion(
         yield from _direction(joint, backward=number in backward)
         yield from _not_told(joint)
         yield from _still(joint)
+        yield from _sinks(joint)
         if motion.ahead:
             yield joint.warning(
                 "late", joint.command, lag=motion.ahead, delay=delay - motion.ahead
@@ -225,6 +230,23 @@ def _still(joint: _Joint) -> Iterator[LogFinding]:
     if motion.push > MUCH_PUSH and 0 < motion.travel < HARDLY_MOVES:
         most = joint.angle.shown.way(motion.travel)
         yield joint.warning("no motion", joint.angle, most=most, unit=_in_unit(joint))
+
+
+def _sinks(joint: _Joint) -> Iterator[LogFinding]:
+    """Yield that a joint moves slowly while no joint is driven: its oil leaks."""
+    way, seconds = joint.motion.sinking
+    if abs(way) < LEAST_SINKING or abs(way) < SLOWEST_SINKING * seconds:
+        return
+    yield log_finding(
+        "note",
+        "sinks",
+        joint.motion.log.source,
+        joint.angle.owner,
+        column=joint.angle.name,
+        by=joint.angle.shown.way(abs(way)),
+        path="positive" if way > 0 else "negative",
+        seconds=seconds,
+    )
 
 
 def _in_unit(joint: _Joint) -> str:

@@ -34,6 +34,7 @@ SAID = (
     "gap",
     "half a command",
     "unasked",
+    "sinks",
     "one sign",
     "target",
 )

@@ -51,6 +51,30 @@ def test_a_joint_that_rests_most_of_the_time_is_as_fast():
     assert sum(resting.unasked) < 1.0
 
 
+@pytest.mark.parametrize(("speed", "said"), [(-0.1, True), (0.0, False)])
+def test_an_arm_that_sinks_is_named(speed, said):
+    """By 0.1 deg/s, after a motion and before another one."""
+    moving = joint_log(lag=0.1)
+    samples = round(30 / PERIOD)
+    times = PERIOD * np.arange(samples)
+    noise = 2e-4 * np.random.default_rng(1).normal(size=samples)
+    rest = moving.angle[-1] + np.radians(speed) * times + noise
+    onwards = moving.angle + rest[-1] - moving.angle[0]
+    angle = np.concatenate([moving.angle, rest[:, None], onwards])
+    command = np.concatenate([moving.command, 0 * rest[:, None], moving.command])
+    time = PERIOD * np.arange(len(command))
+    log = replace(moving, time=time, command=command, angle=angle)
+    way, seconds = JointMotion(log, 1).sinking
+    assert way == pytest.approx(speed * seconds, abs=0.1)
+    assert seconds == pytest.approx(30, abs=4)
+    signals = [
+        Signal("u", "command", joint=1),
+        Signal("q", "angle", joint=1, unit="deg"),
+    ]
+    kinds = [one.kind for one in check_motion(log, signals, [1], [], 0.0)]
+    assert ("sinks" in kinds) == said
+
+
 def test_the_noise_of_a_coil_is_no_command_that_asks_for_a_motion():
     full = joint_log()
     noise = 0.3 * np.random.default_rng(1).random(full.command.shape)

@@ -77,6 +77,23 @@ def of(
     ]
 
 
+def leaking() -> list[Table]:
+    """A log at whose end nothing is driven for 30 s, while the shoulder sinks by 0.1
+    deg/s."""
+    table = rig()
+    steps = np.arange(1, 3001)
+    for name, values in table.items():
+        rest = np.full(len(steps), values[-1])
+        if name == "time_s":
+            rest = values[-1] + 0.01 * steps
+        elif name.endswith("_pct"):
+            rest = np.zeros(len(steps))
+        elif name == "q2_deg":
+            rest = values[-1] - 0.001 * steps
+        table[name] = np.append(values, rest)
+    return [table]
+
+
 def boom(duties: list[float], *, stop: float = 60.0, seconds: float = 4.0) -> Table:
     """A boom of ours that rests, is driven by each duty [%], and rests; its pump comes
     up after 1.5 s."""
@@ -335,6 +352,11 @@ WRONG = (
         "a joint that is pushed against its stop",
         "note: upper end",
         lambda: [boom([100, 60, -60])],
+    ),
+    Wrong(
+        "an arm that leaks",
+        "note: moves slowly",
+        leaking,
     ),
     Wrong(
         "a joint that stalls",

@@ -235,7 +235,7 @@ class JointMotion:
     def sinking(self) -> tuple[float, float]:
         """Its slow way while no joint of the machine is driven [deg], and for how long
         that is [s]."""
-        given = (np.abs(self.log.command) >= LEAST_COMMAND).any(axis=1)
+        given: Mask = np.any(np.abs(self.log.command) >= LEAST_COMMAND, axis=1)
         idle = self._without(given, UNASKED_AFTER)
         # the speed is smoothed over a part of the next motion, too
         idle &= self._without(given[::-1], 4 * SLOW)[::-1]

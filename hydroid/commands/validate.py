@@ -29,12 +29,12 @@ from hydroid.settings.log import log_file
 from hydroid.words import listed, numbered
 
 OWN = "is what the fit itself simulates: that tests nothing"
+OWN_ERROR = 2e-7
+"""rms error of every joint [rad, m] below which a log is the fit's own simulation"""
 IN_OTHER_UNITS = (
     "seems to be in other units than the logs of the fit: that tests nothing, "
     "and the report of the fit does not show it"
 )
-OWN_ERROR = 2e-7
-"""rms error of every joint [rad, m] below which a log is the fit's own simulation"""
 
 if TYPE_CHECKING:
     from hydroid.advice.loads import Load

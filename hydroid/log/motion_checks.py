@@ -235,7 +235,7 @@ def _still(joint: _Joint) -> Iterator[LogFinding]:
 def _sinks(joint: _Joint) -> Iterator[LogFinding]:
     """Yield that a joint moves slowly while no joint is driven: its oil leaks."""
     way, seconds = joint.motion.sinking
-    if abs(way) < LEAST_SINKING or abs(way) < SLOWEST_SINKING * seconds:
+    if abs(way) < max(LEAST_SINKING, SLOWEST_SINKING * seconds):
         return
     yield log_finding(
         "note",
